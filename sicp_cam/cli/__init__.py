@@ -1,0 +1,1 @@
+"""The command line: turns words into a job and a result into words."""

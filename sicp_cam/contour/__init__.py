@@ -1,0 +1,1 @@
+"""Contours: boundaries, frames along them, curvature and subdivision. Arrays in, arrays out."""

@@ -1,0 +1,1 @@
+"""Registration: start, rigid pose, segments, blending. Arrays in, arrays out."""

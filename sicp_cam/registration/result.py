@@ -1,0 +1,117 @@
+"""What a registration yields: the corrected contours with everything that was measured on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sicp_cam.contour.frames import FramedCurve
+from sicp_cam.findings import Finding
+from sicp_cam.model import BoolArray, FloatArray
+
+__all__ = ["RegisteredContour", "Residuals", "Segment"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Residuals:
+    """Where the scan lies, seen from a curve, at each of its k stations; NaN where the scan shows nothing.
+
+    Parameters
+    ----------
+    normal_mm
+        (k,) scan edge minus curve along B: positive where the scan edge lies further into the material.
+    out_mm
+        (k,) scan surface minus curve along N: positive where the scan lies outside of the curve.
+    """
+
+    normal_mm: FloatArray
+    out_mm: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segment:
+    """One piece of the subdivided contour and its own rigid motion.
+
+    Parameters
+    ----------
+    start_mm, end_mm
+        Arc lengths between which it is used, overlaps included; `end_mm` may exceed the length of a closed contour.
+    T_scan_part
+        (4, 4) motion of this segment, mm.
+    rms_mm
+        Root mean square of its residuals after registration.
+    """
+
+    start_mm: float
+    end_mm: float
+    T_scan_part: FloatArray
+    rms_mm: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegisteredContour:
+    """A nominal contour and where the scan says that it is.
+
+    All curves have the same k stations. `nominal` is in the part frame, everything else in the scan frame.
+
+    Parameters
+    ----------
+    number
+        Number of the contour in the part, from 1, as `inspect` shows it.
+    nominal, rigid, corrected
+        The curve as designed, after the rigid registration, and after the chosen method.
+    covered
+        (k,) True where the scan shows the edge.
+    scan_edge_mm
+        (m, 3) scan points that were taken for the edge.
+    before, after
+        Residuals of the scan against `rigid` and against `corrected`.
+    segments
+        The pieces of S-ICP in order; empty for the rigid method.
+    split_s_mm
+        (p,) arc lengths of the subdivision points.
+    stability_part_mm, stability_scan_mm
+        (q, 3) stability points as designed and as registered.
+    """
+
+    number: int
+    nominal: FramedCurve
+    rigid: FramedCurve
+    corrected: FramedCurve
+    covered: BoolArray
+    scan_edge_mm: FloatArray
+    before: Residuals
+    after: Residuals
+    segments: tuple[Segment, ...]
+    split_s_mm: FloatArray
+    stability_part_mm: FloatArray
+    stability_scan_mm: FloatArray
+    symmetric: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Registration:
+    """The registration of a part to a scan.
+
+    Parameters
+    ----------
+    method
+        `rigid`, `paper` or `sicp`.
+    T_scan_part
+        (4, 4) the rigid pose, mm.
+    contours
+        One entry per registered contour.
+    spacing_mm, noise_mm
+        Point spacing and out-of-surface noise (standard deviation) of the scan near the contours.
+    freedoms
+        (6,) singular values of the rigid problem, scaled by the radius of gyration, largest first, between 0 and 1.
+    findings
+        What was noticed on the way.
+    """
+
+    method: str
+    T_scan_part: FloatArray
+    contours: tuple[RegisteredContour, ...]
+    spacing_mm: float
+    noise_mm: float
+    freedoms: FloatArray
+    findings: tuple[Finding, ...] = ()

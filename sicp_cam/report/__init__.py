@@ -1,0 +1,1 @@
+"""Reports: statistics, figures, scenes and the PDF."""

@@ -1,0 +1,1 @@
+"""Tool paths: transfer of the correction, tool axes, gates. Arrays in, arrays out."""
