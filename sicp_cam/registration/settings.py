@@ -1,0 +1,31 @@
+"""What an operator may set about a registration; every default fits an ordinary job."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["METHODS", "RegistrationSettings"]
+
+METHODS = ("sicp", "rigid", "paper")
+
+
+@dataclass(frozen=True, slots=True)
+class RegistrationSettings:
+    """Settings of the registration.
+
+    Parameters
+    ----------
+    segments
+        Number of pieces of each contour; None lets the residual choose.
+    overlap
+        Fraction of the mean length of two neighbouring segments that both of them cover; 0.2 to 0.4.
+    corner_radius_mm
+        Radius of curvature below which a bend of the contour becomes a subdivision point.
+    reach_mm
+        How far from the rigidly registered contour the scan is looked at; wider than the largest deformation.
+    """
+
+    segments: int | None = None
+    overlap: float = 0.3
+    corner_radius_mm: float = 20.0
+    reach_mm: float = 40.0
