@@ -8,7 +8,7 @@ from sicp_cam.contour.frames import FramedCurve
 from sicp_cam.findings import Finding
 from sicp_cam.model import BoolArray, FloatArray
 
-__all__ = ["RegisteredContour", "Residuals", "Segment"]
+__all__ = ["RegisteredContour", "Registration", "Residuals", "Segment"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +85,6 @@ class RegisteredContour:
     split_s_mm: FloatArray
     stability_part_mm: FloatArray
     stability_scan_mm: FloatArray
-    symmetric: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +103,8 @@ class Registration:
         Point spacing and out-of-surface noise (standard deviation) of the scan near the contours.
     freedoms
         (6,) singular values of the rigid problem, scaled by the radius of gyration, largest first, between 0 and 1.
+    symmetry
+        Misfit of the next best start pose over that of the one taken; None where the start was given.
     findings
         What was noticed on the way.
     """
@@ -114,4 +115,5 @@ class Registration:
     spacing_mm: float
     noise_mm: float
     freedoms: FloatArray
+    symmetry: float | None = None
     findings: tuple[Finding, ...] = ()

@@ -1,0 +1,111 @@
+"""Where a scan ends: boundary edges of a mesh, and the points of a cloud that lie at its rim."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from sicp_cam.model import FloatArray, IntArray
+
+__all__ = ["Rim", "cloud_rim", "mesh_boundary_edges", "mesh_rim", "surface_normals"]
+
+NEIGHBOURS = 16
+OPEN_ANGLE = np.radians(120.0)
+"""A point whose neighbours leave a sector wider than this open lies at the rim."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rim:
+    """Points at the rim of a scan.
+
+    Parameters
+    ----------
+    indices
+        (m,) indices into the scan's points.
+    points_mm
+        (m, 3) the points.
+    open_directions
+        (m, 3) unit vectors in the surface towards the side that holds no points.
+    """
+
+    indices: IntArray
+    points_mm: FloatArray
+    open_directions: FloatArray
+
+
+def mesh_boundary_edges(faces: IntArray) -> IntArray:
+    """Return the (e, 2) directed edges that only one face has, with that face on the left.
+
+    >>> mesh_boundary_edges(np.array([[0, 1, 2], [2, 1, 3]])).tolist()
+    [[0, 1], [1, 3], [2, 0], [3, 2]]
+    """
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    key = low * (int(edges.max(initial=0)) + 1) + high
+    _, first, count = np.unique(key, return_index=True, return_counts=True)
+    single: IntArray = edges[first[count == 1]]
+    return single[np.lexsort((single[:, 1], single[:, 0]))]
+
+
+def mesh_rim(vertices_mm: FloatArray, faces: IntArray) -> Rim:
+    """Return the vertices on the boundary of a mesh; the open side of each lies away from its faces."""
+    edges = mesh_boundary_edges(faces)
+    indices = np.unique(edges)
+    outward = np.zeros_like(vertices_mm)
+    rim_faces = faces[np.isin(faces, indices).any(axis=1)]
+    centres = vertices_mm[rim_faces].mean(axis=1)
+    for corner in range(3):
+        np.add.at(outward, rim_faces[:, corner], vertices_mm[rim_faces[:, corner]] - centres)
+    along = np.zeros_like(vertices_mm)
+    step = vertices_mm[edges[:, 1]] - vertices_mm[edges[:, 0]]
+    np.add.at(along, edges[:, 0], step)
+    np.add.at(along, edges[:, 1], step)
+    T = _unit(along[indices])
+    away = outward[indices]
+    return Rim(indices, vertices_mm[indices], _unit(away - np.sum(away * T, axis=1, keepdims=True) * T))
+
+
+def surface_normals(neighbours_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fit a plane to each of n groups of k neighbouring points, given as (n, k, 3).
+
+    Returns
+    -------
+    normals, centres
+        (n, 3) unit normals of arbitrary side, and (n, 3) centroids.
+    """
+    centres = neighbours_mm.mean(axis=1)
+    spread = neighbours_mm - centres[:, None]
+    _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", spread, spread))
+    return vectors[:, :, 0], centres
+
+
+def cloud_rim(points_mm: FloatArray, tree: cKDTree) -> Rim:
+    """Find the rim of an (n, 3) cloud by the open angle that a point's neighbours leave in its tangent plane."""
+    _, near = tree.query(points_mm, k=min(NEIGHBOURS + 1, len(points_mm)))
+    offsets = points_mm[near[:, 1:]] - points_mm[:, None]
+    N, _ = surface_normals(points_mm[near])
+    first = _unit(np.cross(N, _least_aligned_axis(N)))
+    second = np.cross(N, first)
+    angle = np.sort(
+        np.arctan2(np.einsum("nki,ni->nk", offsets, second), np.einsum("nki,ni->nk", offsets, first)), axis=1
+    )
+    gaps = np.diff(np.concatenate([angle, angle[:, :1] + 2.0 * np.pi], axis=1), axis=1)
+    widest = np.argmax(gaps, axis=1)
+    rows = np.arange(len(points_mm))
+    middle = angle[rows, widest] + 0.5 * gaps[rows, widest]
+    open_side = np.cos(middle)[:, None] * first + np.sin(middle)[:, None] * second
+    rim = gaps[rows, widest] > OPEN_ANGLE
+    return Rim(np.flatnonzero(rim), points_mm[rim], open_side[rim])
+
+
+def _least_aligned_axis(N: FloatArray) -> FloatArray:
+    axes: FloatArray = np.eye(3)[np.argmin(np.abs(N), axis=1)]
+    return axes
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit: FloatArray = vectors / np.where(length > 0.0, length, 1.0)
+    return unit

@@ -1,0 +1,211 @@
+"""Find the start pose from the geometry alone: the contour signature.
+
+The nominal loop and each loop of the scan are resampled to equally many points. A fast Fourier transform gives the
+cross-covariance of every cyclic shift at once, its singular value decomposition the rotation, and what is left over
+the misfit. Every separate minimum is refined by the rigid registration, surface included, and only a pose that fits
+clearly better than every other one is accepted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sicp_cam.contour.frames import FramedCurve, at, moved
+from sicp_cam.contour.loops import resampled, rim_loops
+from sicp_cam.contour.projection import nearest
+from sicp_cam.errors import AmbiguousPoseError, RegistrationError
+from sicp_cam.model import FloatArray
+from sicp_cam.registration.rigid import NominalContour, register_rigidly
+from sicp_cam.registration.scan_surface import ScanSurface, distances_along_normal
+from sicp_cam.rigid_motion import apply, best_fit, rotate
+
+__all__ = ["Start", "find_start", "scan_loops", "signature_poses"]
+
+SIGNATURE_POINTS = 256
+LENGTH_TOLERANCE = 0.2
+POSES_PER_LOOP = 8
+WORTH_REFINING = 4.0
+"""Poses whose signature fits this many times worse than the best one's are not looked at further."""
+REFINING_STEPS = 20
+CLEAR_RATIO = 1.5
+"""How much worse every other pose must fit before the best one is believed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """A start pose and how clear it is.
+
+    Parameters
+    ----------
+    T_scan_part
+        (4, 4) pose, refined by the rigid registration.
+    misfit_mm
+        Root mean square distance of scan and part there.
+    symmetry
+        Misfit of the best pose that would put the path elsewhere, over this one; `WORTH_REFINING` if there is none.
+    """
+
+    T_scan_part: FloatArray
+    misfit_mm: float
+    symmetry: float
+
+
+def scan_loops(surface: ScanSurface, length_mm: float) -> list[FloatArray]:
+    """Return the closed loops of the scan whose length is within 20 % of the given one, best match first."""
+    loops = rim_loops(surface.rim, surface.spacing_mm, (1.0 - LENGTH_TOLERANCE) * length_mm)
+    off = [abs(resampled(loop, SIGNATURE_POINTS)[1] / length_mm - 1.0) for loop in loops]
+    order = np.argsort(off)
+    return [loops[i] for i in order if off[i] <= LENGTH_TOLERANCE]
+
+
+def signature_poses(nominal: FloatArray, measured: FloatArray) -> list[tuple[float, FloatArray]]:
+    """Fit a nominal loop to a measured one at every cyclic shift and in both senses.
+
+    Parameters
+    ----------
+    nominal, measured
+        (n, 3) equally many points at equal arc lengths.
+
+    Returns
+    -------
+    list of (misfit in mm, (4, 4) pose), one for each local minimum over the shift, best first.
+    """
+    found = []
+    for sense in (1, -1):
+        target = measured[::sense]
+        misfit = _misfit_of_shifts(nominal, target)
+        lowest = (misfit <= np.roll(misfit, 1)) & (misfit < np.roll(misfit, -1))
+        # A flat misfit (a circle) has no minimum worth the name: any one shift stands for all.
+        shifts = np.flatnonzero(lowest) if lowest.any() else np.array([int(np.argmin(misfit))])
+        found += [(float(misfit[k]), best_fit(nominal, np.roll(target, -k, axis=0))) for k in shifts]
+    return sorted(found, key=lambda item: item[0])
+
+
+def _misfit_of_shifts(nominal: FloatArray, measured: FloatArray) -> FloatArray:
+    a, b = nominal - nominal.mean(axis=0), measured - measured.mean(axis=0)
+    spectrum = np.conj(np.fft.fft(a, axis=0))[:, :, None] * np.fft.fft(b, axis=0)[:, None, :]
+    covariance = np.fft.ifft(spectrum, axis=0).real  # [k] = sum_i a_i b_(i+k)^T
+    singular = np.linalg.svd(covariance, compute_uv=False)
+    singular[:, 2] *= np.sign(np.linalg.det(covariance))
+    square = np.sum(a * a) + np.sum(b * b) - 2.0 * singular.sum(axis=1)
+    return np.asarray(np.sqrt(np.maximum(square, 0.0) / len(nominal)))
+
+
+def find_start(
+    contours: Sequence[NominalContour],
+    surface: ScanSurface,
+    *,
+    reach_mm: float,
+) -> Start:
+    """Find the pose of the part in the scan from any starting pose.
+
+    Raises
+    ------
+    RegistrationError
+        If no loop of the scan has the length of the contour, or none fits.
+    AmbiguousPoseError
+        If poses that would put the path or its outward side elsewhere fit about equally well.
+    """
+    main = max(contours, key=lambda contour: contour.curve.length_mm)
+    nominal = at(main.curve, np.arange(SIGNATURE_POINTS) * main.curve.length_mm / SIGNATURE_POINTS).points_mm
+    loops = scan_loops(surface, main.curve.length_mm) if main.curve.closed else []
+    if not loops:
+        raise RegistrationError(
+            f"no closed edge of the scan is about {main.curve.length_mm:.0f} mm long, as the contour is;"
+            " give a rough pose or datum pairs with --align FILE"
+        )
+    poses = [pose for loop in loops[:4] for pose in _candidates(nominal, loop)]
+    least = min(misfit for misfit, _ in poses)
+    worth = [T for misfit, T in sorted(poses, key=lambda item: item[0]) if misfit <= WORTH_REFINING * least]
+    tried = [_refined(contours, surface, T, reach_mm) for T in worth[: 2 * POSES_PER_LOOP]]
+    refined = [start for start in tried if start is not None]
+    if not refined:
+        raise RegistrationError(
+            "no edge of the scan fits the contour; check that scan and part belong together,"
+            " or give a rough pose or datum pairs with --align FILE"
+        )
+    return _clearest(refined, main.curve, is_circular(nominal))
+
+
+def is_circular(nominal: FloatArray) -> bool:
+    """Say whether a closed loop of (n, 3) evenly spaced points falls onto itself at every cyclic shift."""
+    size = float(np.sqrt(np.mean(np.sum((nominal - nominal.mean(axis=0)) ** 2, axis=1))))
+    return bool(_misfit_of_shifts(nominal, nominal).max() < 0.01 * size)
+
+
+def _candidates(nominal: FloatArray, loop: FloatArray) -> list[tuple[float, FloatArray]]:
+    measured, _ = resampled(loop, SIGNATURE_POINTS)
+    return signature_poses(nominal, measured)[:POSES_PER_LOOP]
+
+
+def _refined(
+    contours: Sequence[NominalContour],
+    surface: ScanSurface,
+    T: FloatArray,
+    reach_mm: float,
+) -> tuple[float, FloatArray] | None:
+    try:
+        pose = register_rigidly(contours, surface, T, reach_mm=reach_mm, iterations=REFINING_STEPS)
+    except RegistrationError:
+        return None
+    if _outward_agreement(contours, surface, pose.T_scan_part) < 0.0:
+        return None  # the scan's own normals say that this is the other side
+    misfit = _surface_misfit(contours, surface, pose.T_scan_part, reach_mm)
+    return (float(np.hypot(misfit, pose.rms_mm)), pose.T_scan_part) if np.isfinite(misfit) else None
+
+
+def _outward_agreement(contours: Sequence[NominalContour], surface: ScanSurface, T: FloatArray) -> float:
+    """Return the mean cosine between the part's outward normals and the normals that came with the scan, 0 if none."""
+    if surface.normals is None:
+        return 0.0
+    points = np.concatenate([contour.ring_points_mm for contour in contours])
+    normals = np.concatenate([contour.ring_normals for contour in contours])
+    _, index = surface.tree.query(apply(T, points))
+    return float(np.sum(surface.normals[index] * rotate(T, normals), axis=1).mean()) if len(points) else 0.0
+
+
+def _surface_misfit(contours: Sequence[NominalContour], surface: ScanSurface, T: FloatArray, reach_mm: float) -> float:
+    """Return the RMS distance of stability points from the scan; one without surface counts a quarter of the reach."""
+    points = np.concatenate([contour.ring_points_mm for contour in contours])
+    normals = np.concatenate([contour.ring_normals for contour in contours])
+    if not len(points):
+        return 0.0
+    distances, _ = distances_along_normal(surface, apply(T, points), rotate(T, normals), reach_mm)
+    missing = np.isnan(distances)
+    if missing.mean() > 0.5:
+        return float("inf")
+    return float(np.sqrt(np.mean(np.where(missing, 0.25 * reach_mm, distances) ** 2)))
+
+
+def _clearest(refined: list[tuple[float, FloatArray]], curve: FramedCurve, circular: bool) -> Start:
+    refined = sorted(refined, key=lambda item: item[0])
+    misfit, T = refined[0]
+    for other_misfit, other in refined[1:]:
+        difference = _difference(T, other, curve, circular)
+        if difference is None:
+            continue
+        ratio = other_misfit / max(misfit, 1e-9)
+        if ratio < CLEAR_RATIO:
+            raise AmbiguousPoseError(
+                f"the contour is symmetric: a pose with {difference} fits {ratio:.2f} times as badly as the best one"
+                f" ({misfit:.2f} mm), which is too close to call; give a rough pose or datum pairs with --align FILE"
+            )
+        return Start(T, misfit, ratio)
+    return Start(T, misfit, WORTH_REFINING)
+
+
+def _difference(T: FloatArray, other: FloatArray, curve: FramedCurve, circular: bool) -> str | None:
+    """Say in what two poses differ that matters to the operator; None if they are the same pose.
+
+    Turning a circle about its own axis moves no point off the path, so it does not matter.
+    """
+    a, b = moved(curve, T), moved(curve, other)
+    if float(a.outward.mean(axis=0) @ b.outward.mean(axis=0)) < 0.0:
+        return "the other side outward"
+    apart = nearest(b.points_mm, a)[1] if circular else np.linalg.norm(a.points_mm - b.points_mm, axis=1)
+    if float(np.median(apart)) < 0.005 * curve.length_mm:
+        return None
+    return f"the path moved or turned by {np.median(apart):.0f} mm"
