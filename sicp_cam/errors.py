@@ -12,6 +12,7 @@
     │   └── AmbiguousPoseError      two poses fit about equally
     ├── PathError           exit 5  the corrected path breaks a gate
     ├── OutputError         exit 6  an output exists, is not writable or left its folder
+    ├── WarningsError       exit 7  something was noticed, and the job is strict
     └── ReportError         exit 8  the program is written, a picture or page is not
 
 Each message is one line: what is wrong, where, and what to do about it.
@@ -33,6 +34,7 @@ __all__ = [
     "ReportError",
     "SicpError",
     "UnitError",
+    "WarningsError",
     "printable",
 ]
 
@@ -121,6 +123,12 @@ class OutputError(SicpError, OSError):
     """An output that may not or cannot be written."""
 
     exit_code = 6
+
+
+class WarningsError(SicpError, RuntimeError):
+    """Warnings in a job that demands none (`--strict`)."""
+
+    exit_code = 7
 
 
 class ReportError(SicpError, RuntimeError):

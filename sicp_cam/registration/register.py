@@ -18,7 +18,7 @@ from sicp_cam.registration.scan_surface import ScanSurface, cropped, prepared
 from sicp_cam.registration.segments import blended
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
 from sicp_cam.registration.sicp import Subdivided, paper_s_icp, s_icp
-from sicp_cam.registration.start import find_start
+from sicp_cam.registration.start import find_start, is_symmetric
 from sicp_cam.rigid_motion import apply
 
 __all__ = ["register_contours"]
@@ -131,6 +131,7 @@ def _registered_contour(
         splits,
         contour.ring_points_mm,
         stability,
+        is_symmetric(contour.curve),
     )
     return registered, after.noise_mm
 

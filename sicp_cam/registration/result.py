@@ -71,6 +71,8 @@ class RegisteredContour:
         (p,) arc lengths of the subdivision points.
     stability_part_mm, stability_scan_mm
         (q, 3) stability points as designed and as registered.
+    symmetric
+        True if the nominal contour falls onto itself when it is turned or turned over.
     """
 
     number: int
@@ -85,6 +87,7 @@ class RegisteredContour:
     split_s_mm: FloatArray
     stability_part_mm: FloatArray
     stability_scan_mm: FloatArray
+    symmetric: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

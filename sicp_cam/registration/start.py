@@ -22,7 +22,7 @@ from sicp_cam.registration.rigid import NominalContour, register_rigidly
 from sicp_cam.registration.scan_surface import ScanSurface, distances_along_normal
 from sicp_cam.rigid_motion import apply, best_fit, rotate
 
-__all__ = ["Start", "find_start", "scan_loops", "signature_poses"]
+__all__ = ["Start", "find_start", "is_circular", "is_symmetric", "scan_loops", "signature_poses"]
 
 SIGNATURE_POINTS = 256
 LENGTH_TOLERANCE = 0.2
@@ -30,6 +30,8 @@ POSES_PER_LOOP = 8
 WORTH_REFINING = 4.0
 """Poses whose signature fits this many times worse than the best one's are not looked at further."""
 REFINING_STEPS = 20
+SELF_MISFIT = 0.01
+"""Misfit of a contour to itself, over its size, below which it counts as falling onto itself."""
 CLEAR_RATIO = 1.5
 """How much worse every other pose must fit before the best one is believed."""
 
@@ -130,10 +132,21 @@ def find_start(
     return _clearest(refined, main.curve, is_circular(nominal))
 
 
+def is_symmetric(curve: FramedCurve) -> bool:
+    """Say whether a closed contour nearly falls onto itself when it is turned or turned over."""
+    if not curve.closed:
+        return False
+    points = at(curve, np.arange(SIGNATURE_POINTS) * curve.length_mm / SIGNATURE_POINTS).points_mm
+    size = float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
+    far = slice(SIGNATURE_POINTS // 20, -(SIGNATURE_POINTS // 20))
+    turned_over = _misfit_of_shifts(points, points[::-1]).min()
+    return bool(min(_misfit_of_shifts(points, points)[far].min(), turned_over) < SELF_MISFIT * size)
+
+
 def is_circular(nominal: FloatArray) -> bool:
     """Say whether a closed loop of (n, 3) evenly spaced points falls onto itself at every cyclic shift."""
     size = float(np.sqrt(np.mean(np.sum((nominal - nominal.mean(axis=0)) ** 2, axis=1))))
-    return bool(_misfit_of_shifts(nominal, nominal).max() < 0.01 * size)
+    return bool(_misfit_of_shifts(nominal, nominal).max() < SELF_MISFIT * size)
 
 
 def _candidates(nominal: FloatArray, loop: FloatArray) -> list[tuple[float, FloatArray]]:

@@ -39,13 +39,15 @@ class GateLimits:
     Parameters
     ----------
     path_distance_mm
-        Largest distance of a cutting move from the contour that it follows.
+        Distance from its contour up to which a feed move cuts; also the limit of the median over all feed moves.
     coverage
         Least fraction of the contour on which the scan must show the edge.
     residual_mm
         Largest mean distance between scan and corrected contour, out of the surface.
     edge_residual_mm
         Largest mean distance between scan edge and corrected contour, in the surface.
+    stretch
+        Largest relative change of the contour's length; a part that bends keeps it.
     correction_mm
         Largest move of a point by the deformation, beyond the rigid pose.
     axis_deg
@@ -58,6 +60,7 @@ class GateLimits:
     coverage: float = 0.5
     residual_mm: float = 0.5
     edge_residual_mm: float = 3.0
+    stretch: float = 0.02
     correction_mm: float = 30.0
     axis_deg: float = 15.0
     jump_mm: float = 0.5

@@ -1,0 +1,81 @@
+"""Take the bytes of an input file, refuse what cannot be a CAM input, and record where an object came from."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import stat
+from pathlib import Path
+
+from sicp_cam.errors import FormatError
+from sicp_cam.limits import Limits
+from sicp_cam.model import Source
+
+__all__ = ["describe", "read_bytes"]
+
+# A file that was never unpacked, or that a web server or Git put in place of the one that was asked for.
+_FOREIGN = (
+    (re.compile(rb"\x1f\x8b"), "a gzip archive; unpack it first"),
+    (re.compile(rb"PK\x03\x04"), "a zip archive; unpack it first"),
+    (re.compile(rb"BZh[1-9]1AY&SY"), "a bzip2 archive; unpack it first"),
+    (re.compile(rb"\xfd7zXZ\x00"), "an xz archive; unpack it first"),
+    (re.compile(rb"7z\xbc\xaf\x27\x1c"), "a 7z archive; unpack it first"),
+    (re.compile(rb"\x28\xb5\x2f\xfd"), "a zstd archive; unpack it first"),
+    (re.compile(rb"%PDF-"), "a PDF document; export the data itself"),
+    (
+        re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<!--.{0,400}?-->\s*)?<(?:!doctype\s+html|html[\s>])", re.I | re.S),
+        "an HTML page, probably a log-in or error page of a download; fetch the file again",
+    ),
+    (
+        re.compile(rb"version https://git-lfs\.github\.com/spec/"),
+        "a Git LFS pointer and not the file itself; run 'git lfs pull'",
+    ),
+)
+
+
+def read_bytes(path: Path, limits: Limits) -> bytes:
+    """Return the whole content of a regular file.
+
+    Raises
+    ------
+    FormatError
+        If the file does not exist, is no regular file, may not be read, is empty or larger than `limits.file_bytes`,
+        or is an archive, an HTML page, a PDF or a Git LFS pointer.
+    """
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise FormatError(path, "is a folder; name a file in it")
+        if not stat.S_ISREG(status.st_mode):
+            raise FormatError(path, "is no regular file (a device or a pipe); copy the data into a file first")
+        _check_size(path, status.st_size, limits)
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise FormatError(path, "no such file; check the name and the folder") from None
+    except OSError as error:
+        raise FormatError(path, f"cannot be read ({error.strerror or error})") from None
+    except FormatError:
+        raise
+    except ValueError as error:  # a NUL in the name
+        raise FormatError(path, f"is no possible file name ({error})") from None
+    _check_size(path, len(content), limits)
+    for signature, meaning in _FOREIGN:
+        if signature.match(content[:1024]):
+            raise FormatError(path, f"is {meaning}", byte=0)
+    return content
+
+
+def describe(path: Path, content: bytes, *, format: str, unit: str, unit_stated: bool) -> Source:
+    """Return the record of an input: its name, format, unit, and the SHA-256 of its content.
+
+    >>> describe(Path("a.ply"), b"", format="PLY", unit="mm", unit_stated=False).sha256[:8]
+    'e3b0c442'
+    """
+    return Source(str(path), format, hashlib.sha256(content).hexdigest(), unit, unit_stated)
+
+
+def _check_size(path: Path, size: int, limits: Limits) -> None:
+    if size == 0:
+        raise FormatError(path, "the file is empty; export it again", byte=0)
+    if size > limits.file_bytes:
+        raise FormatError(path, f"has {size} bytes, more than the limit file_bytes = {limits.file_bytes}; raise it")

@@ -1,0 +1,210 @@
+"""Generic five-axis G-code with tool tip control: the control keeps the tip on the path while the axes turn."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from sicp_cam.errors import PathError
+from sicp_cam.findings import Finding, Level
+from sicp_cam.model import Event, EventKind, FloatArray, Program
+from sicp_cam.units import mm_per_unit
+from sicp_postprocessors.base import SAFETY_NOTE, LinePostprocessor, Move, events_in_order, failures
+from sicp_postprocessors.checks import frame_findings, move_place, stretch_findings
+from sicp_postprocessors.gcode_options import GCodeOptions
+from sicp_postprocessors.numbers import fixed, rounded, trimmed
+from sicp_postprocessors.rotary import HeadAngles, axes_from_angles, axis_errors_deg, head_angles
+from sicp_postprocessors.text import ascii_lines, pose_words
+
+__all__ = ["GCode", "GCodeOptions"]
+
+_FEED_DECIMALS = {"mm": 3, "inch": 5}
+_VERIFIED_DEG = 1e-4
+# LinuxCNC acts on comments that begin with these words: it shows them, writes files, runs Python.
+_ACTIVE_COMMENT = re.compile(r"(msg|debug|print|log|probe|py|abort)", re.IGNORECASE)
+
+
+class GCode(LinePostprocessor):
+    """G-code of a five-axis control: absolute, millimetres or inches, feed per minute.
+
+    Every block states its G word and all its coordinates, so that the program can be entered anywhere by eye. Rotary
+    words are checked by forward kinematics, block for block, against the axes of the path.
+    """
+
+    name = "gcode"
+    summary = "five-axis G-code with tool tip control: I J K, A/B/C or Siemens A3= B3= C3="
+    Options = GCodeOptions
+    options: GCodeOptions
+    suffix = ".nc"
+
+    def preflight(self, program: Program) -> list[Finding]:
+        """Return the findings of every post, of the program frame, and of the rotary axes."""
+        findings = super().preflight(program)
+        if failures(findings):
+            return findings
+        findings += frame_findings(
+            program, Level.WARN, "set the work offset of the control to the pose in the head of the program"
+        )
+        if self.options.orientation == "rotary":
+            findings += self._rotary_findings(program)
+        return findings
+
+    def begin(self, program: Program) -> Iterator[str]:
+        """Return the head: what it is, where it is valid, and the modes that it relies on."""
+        options = self.options
+        if options.dialect.percent:
+            yield "%"
+        if options.program_number is not None:
+            yield f"O{options.program_number:04d}"
+        kinematics = f" kinematics {options.kinematics} head-head" if options.orientation == "rotary" else ""
+        dwell = "milliseconds" if self._dwell_word() == "P_MS" else "seconds"
+        remarks = [
+            program.name,
+            *program.notes,
+            SAFETY_NOTE,
+            f"units {options.units}, orientation {options.orientation}{kinematics}, dwell in {dwell}",
+        ]
+        if not np.array_equal(program.T_scan_program, np.eye(4)):
+            remarks.append(f"work offset in the scan frame: {pose_words(program.T_scan_program)}")
+        for remark in remarks:
+            yield from self._comment(remark)
+        unit = options.dialect.metric if options.units == "mm" else options.dialect.inch
+        yield f"{unit} G90 G94 G17 G40"
+        if options.work_offset:
+            yield options.work_offset
+        if not any(e.kind is EventKind.TOOL and e.before_move == 0 for e in program.path.events):
+            yield self._tcp_on(options.tool)
+
+    def move(self, move: Move, previous: Move | None) -> Iterator[str]:
+        """Return one block; the feed stands where it changes, and after every rapid move."""
+        factor = mm_per_unit(self.options.units)
+        decimals = self.options.position_decimals
+        words = ["G0" if move.rapid else "G1"]
+        words += [f"{axis}{fixed(v / factor, decimals)}" for axis, v in zip("XYZ", move.tip_mm, strict=True)]
+        words.append(move.orientation)
+        if not move.rapid and (previous is None or previous.rapid or previous.feed_mm_min != move.feed_mm_min):
+            words.append(f"F{trimmed(move.feed_mm_min / factor, _FEED_DECIMALS[self.options.units])}")
+        yield " ".join(words)
+
+    def event(self, event: Event) -> Iterator[str]:
+        """Return the blocks of one event."""
+        match event.kind:
+            case EventKind.SPINDLE if event.value == 0:
+                yield "M5"
+            case EventKind.SPINDLE:
+                yield f"S{trimmed(abs(event.value), 3)} {'M3' if event.value > 0 else 'M4'}"
+            case EventKind.TOOL:
+                # Tip control belongs to one tool: its length must not outlive the change.
+                yield self.options.tcp_off or self.options.dialect.tcp_off
+                yield f"T{int(event.value)} M6"
+                if event.text:
+                    yield from self._comment(event.text)
+                yield self._tcp_on(int(event.value))
+            case EventKind.COOLANT:
+                yield "M8" if event.value > 0 else "M9"
+            case EventKind.DWELL:
+                yield self._dwell(event.value)
+            case EventKind.STOP:
+                yield "M0"
+            case EventKind.COMMENT:
+                yield from self._comment(event.text)
+
+    def end(self, program: Program) -> Iterator[str]:
+        """Return the end: whatever still runs is switched off, tip control too."""
+        running = dict.fromkeys((EventKind.SPINDLE, EventKind.COOLANT), 0.0)
+        running |= {event.kind: event.value for event in events_in_order(program.path) if event.kind in running}
+        if running[EventKind.SPINDLE]:
+            yield "M5"
+        if running[EventKind.COOLANT]:
+            yield "M9"
+        yield self.options.tcp_off or self.options.dialect.tcp_off
+        yield "M30"
+        if self.options.dialect.percent:
+            yield "%"
+
+    def orientations(self, program: Program) -> Sequence[str]:
+        """Return the orientation words of every move.
+
+        Raises
+        ------
+        PathError
+            If forward kinematics of the written rotary words do not give the axis back.
+        """
+        axes, options = program.path.axes, self.options
+        if options.orientation == "rotary":
+            angles = self._rotary_angles(axes)
+            self._verify(program, angles)
+            first, decimals = options.kinematics[0], options.angle_decimals
+            pairs = zip(angles.tilt_deg.tolist(), angles.turn_deg.tolist(), strict=True)
+            return [f"{first}{fixed(tilt, decimals)} C{fixed(turn, decimals)}" for tilt, turn in pairs]
+        i, j, k = ("A3=", "B3=", "C3=") if options.orientation == "siemens" else ("I", "J", "K")
+        rows = rounded(axes, options.vector_decimals).tolist()
+        number = f".{options.vector_decimals}f"
+        return [f"{i}{x:{number}} {j}{y:{number}} {k}{z:{number}}" for x, y, z in rows]
+
+    def assemble(self, lines: Iterable[str]) -> Iterator[str]:
+        """Return the lines with numbered blocks; comments, the O word and percent signs have no number."""
+        number = 0
+        for line in lines:
+            if self.options.line_numbers and line[0] not in "%O(;":
+                number += self.options.line_numbers
+                yield f"N{number} {line}"
+            else:
+                yield line
+
+    def _rotary_angles(self, axes: FloatArray) -> HeadAngles:
+        """Return the angles as they are written, that is rounded."""
+        exact = head_angles(axes, self.options.kinematics, self.options.singular_cone_deg)
+        decimals = self.options.angle_decimals
+        return HeadAngles(rounded(exact.tilt_deg, decimals), rounded(exact.turn_deg, decimals), exact.held)
+
+    def _rotary_findings(self, program: Program) -> list[Finding]:
+        path, options = program.path, self.options
+        angles = self._rotary_angles(path.axes)
+        errors = axis_errors_deg(path.axes, axes_from_angles(angles.tilt_deg, angles.turn_deg, options.kinematics))
+        first, (low, high), (least, most) = options.kinematics[0], options.tilt_limits_deg, options.turn_limits_deg
+        over_tilt = (angles.tilt_deg < low) | (angles.tilt_deg > high)
+        over_turn = (angles.turn_deg < least) | (angles.turn_deg > most)
+        steps = np.maximum(np.abs(np.diff(angles.turn_deg)), np.abs(np.diff(angles.tilt_deg)))
+        large = np.concatenate([[False], steps > options.rotary_step_deg]) & ~path.rapid
+        worst = float(errors[angles.held].max(initial=0.0))
+        held = f"near the pole of the rotary axes: C is held there, which turns the axis by at most {worst:.4f} degrees"
+        fast = f"a rotary axis turns further than {options.rotary_step_deg:g} degrees in one cutting move"
+        return [
+            *stretch_findings(path, angles.held, 620, Level.INFO, held),
+            *stretch_findings(
+                path, over_tilt, 621, Level.FAIL, f"{first} leaves its travel {low:g} to {high:g} degrees"
+            ),
+            *stretch_findings(path, over_turn, 621, Level.FAIL, f"C leaves its travel {least:g} to {most:g} degrees"),
+            *stretch_findings(path, large, 622, Level.WARN, fast),
+        ]
+
+    def _verify(self, program: Program, angles: HeadAngles) -> None:
+        written = axes_from_angles(angles.tilt_deg, angles.turn_deg, self.options.kinematics)
+        errors = axis_errors_deg(program.path.axes, written)
+        precision = max(_VERIFIED_DEG, 10.0**-self.options.angle_decimals)
+        wrong = errors > precision + np.where(angles.held, self.options.singular_cone_deg, 0.0)
+        if wrong.any():
+            move = int(np.argmax(wrong))
+            raise PathError(
+                f"post gcode, {move_place(program.path, move)}: the rotary words miss the tool axis by "
+                f"{errors[move]:.5f} degrees; use orientation vector and report this"
+            )
+
+    def _tcp_on(self, tool: int) -> str:
+        words = self.options.tcp_on or self.options.dialect.tcp_on
+        return words.replace("{tool}", f" H{tool}" if tool else "").strip()
+
+    def _dwell_word(self) -> str:
+        return self.options.dwell or self.options.dialect.dwell
+
+    def _dwell(self, seconds: float) -> str:
+        if self._dwell_word() == "P_MS":
+            return f"G4 P{fixed(round(seconds * 1000.0), 0)}"
+        return f"G4 {self._dwell_word()}{fixed(seconds, 3)}"
+
+    def _comment(self, text: str) -> list[str]:
+        lines = ascii_lines(text, drop="()%;")
+        return [self.options.dialect.comment.format(f"- {x}" if _ACTIVE_COMMENT.match(x) else x) for x in lines]

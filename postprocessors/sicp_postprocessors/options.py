@@ -1,0 +1,143 @@
+"""Options of a postprocessor: a frozen dataclass filled from a job file or a command line, with every problem told."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import types
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from sicp_cam.errors import JobError, printable
+
+__all__ = ["NoOptions", "build_options", "outside"]
+
+T = TypeVar("T")
+
+_WORDS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+_INTEGER = re.compile(r"[+-]?[0-9]{1,18}", re.ASCII)
+_NUMBER = re.compile(r"[+-]?([0-9]{1,18}(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,3})?", re.ASCII)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class NoOptions:
+    """A postprocessor without options."""
+
+
+def build_options(post: str, kind: type[T], given: Mapping[str, object]) -> T:
+    """Build the options of a postprocessor, and refuse what does not fit.
+
+    Values may be of the field's own type, or strings as they come from a command line. Fields may be of type bool,
+    int, float, str, `Literal[...]` of strings, a fixed-length tuple of floats, or one of these `| None`. Ranges are
+    the concern of the dataclass: its `__post_init__` raises `JobError` with one problem per argument.
+
+    Raises
+    ------
+    JobError
+        With every problem found: unknown names, wrong types, values out of range.
+
+    >>> @dataclasses.dataclass(frozen=True)
+    ... class Speeds:
+    ...     rapid_mm_s: float = 250.0
+    ...     blend: bool = False
+    >>> build_options("demo", Speeds, {"rapid_mm_s": "2000", "blend": "true"})
+    Speeds(rapid_mm_s=2000.0, blend=True)
+    >>> build_options("demo", Speeds, {"rapid": 1, "blend": 7})
+    Traceback (most recent call last):
+    sicp_cam.errors.JobError: post demo has no option 'rapid'; it has rapid_mm_s, blend; option 'blend' of post demo \
+must be true or false, not 7
+    """
+    names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]  # T is a dataclass by contract
+    hints = get_type_hints(kind)
+    problems: list[str] = []
+    values: dict[str, Any] = {}
+    for name, value in given.items():
+        if name not in names:
+            known = f"it has {', '.join(names)}" if names else "it has none"
+            problems.append(f"post {post} has no option {printable(str(name))!r}; {known}")
+            continue
+        try:
+            values[name] = _convert(value, hints[name])
+        except ValueError as error:
+            problems.append(f"option {name!r} of post {post} must be {error}, not {printable(repr(value))}")
+    try:
+        options = kind(**values)
+    except JobError as error:
+        problems += [f"post {post}: {problem}" for problem in error.problems]
+    if problems:
+        raise JobError(*problems)
+    return options
+
+
+def outside(name: str, value: float, smallest: float, largest: float) -> list[str]:
+    """Return the problem of an option outside its range, as a list that is empty if there is none.
+
+    >>> outside("decimals", 9, 3, 6)
+    ["option 'decimals' must be from 3 to 6, not 9"]
+    """
+    if smallest <= value <= largest:
+        return []
+    return [f"option {name!r} must be from {smallest:g} to {largest:g}, not {value:g}"]
+
+
+def _convert(value: object, hint: Any) -> Any:
+    """Return a value as the type of its field; ValueError names what would fit."""
+    if get_origin(hint) in (Union, types.UnionType):
+        if value is None or (isinstance(value, str) and value in ("", "none")):
+            return None
+        return _convert(value, next(kind for kind in get_args(hint) if kind is not types.NoneType))
+    if get_origin(hint) is Literal:
+        if isinstance(value, str) and value in get_args(hint):
+            return value
+        raise ValueError(f"one of {', '.join(map(str, get_args(hint)))}")
+    if get_origin(hint) is tuple:
+        return _numbers(value, len(get_args(hint)))
+    converters: dict[Any, Callable[[object], Any]] = {bool: _truth, int: _integer, float: _number, str: _text}
+    if hint not in converters:
+        raise TypeError(f"an option may not be of type {hint}")
+    return converters[hint](value)
+
+
+def _truth(value: object) -> bool:
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, str) and value.strip().lower() in _WORDS:
+        return _WORDS[value.strip().lower()]
+    raise ValueError("true or false")
+
+
+def _integer(value: object) -> int:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value
+    if isinstance(value, str) and _INTEGER.fullmatch(value.strip()):
+        return int(value)
+    raise ValueError("a whole number")
+
+
+def _number(value: object) -> float:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value) if abs(value) < 1e18 else math.inf
+    elif isinstance(value, str) and _NUMBER.fullmatch(value.strip()):
+        number = float(value)
+    else:
+        raise ValueError("a number")
+    if not math.isfinite(number):
+        raise ValueError("a finite number")
+    return number
+
+
+def _numbers(value: object, count: int) -> tuple[float, ...]:
+    parts = value.split(",") if isinstance(value, str) else value
+    if not isinstance(parts, Sequence) or len(parts) != count:
+        raise ValueError(f"{count} numbers")
+    try:
+        return tuple(_number(part) for part in parts)
+    except ValueError:
+        raise ValueError(f"{count} numbers") from None
+
+
+def _text(value: object) -> str:
+    if isinstance(value, str) and value.isascii() and value.isprintable() and len(value) <= 200:
+        return value
+    raise ValueError("a line of plain text (printable ASCII)")

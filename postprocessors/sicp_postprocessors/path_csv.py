@@ -1,0 +1,78 @@
+"""The neutral table: one line per move, for spreadsheets, plots and controllers without a post of their own."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from sicp_cam.findings import Finding, Level
+from sicp_cam.model import Program
+from sicp_postprocessors.base import Postprocessor
+from sicp_postprocessors.checks import frame_findings, name_findings
+from sicp_postprocessors.numbers import rounded
+from sicp_postprocessors.text import file_stem
+
+__all__ = ["COLUMNS", "PathCsv"]
+
+COLUMNS = ("x", "y", "z", "i", "j", "k", "feed", "rapid", "status")
+_POSITION_DECIMALS, _AXIS_DECIMALS, _FEED_DECIMALS, _COLUMN_DECIMALS = 4, 7, 4, 6
+_CHUNK_ROWS = 4096
+
+
+class PathCsv(Postprocessor):
+    """Table of tips in mm, axes from tip to holder, feeds in mm/min, rapid 0 or 1, and status.
+
+    The columns of the program follow in their order. Dots for decimals, commas between cells, one header line.
+    """
+
+    name = "csv"
+    summary = "table x,y,z,i,j,k,feed,rapid,status and further columns"
+    missing_feed = Level.WARN
+
+    def preflight(self, program: Program) -> list[Finding]:
+        """Return the findings of every post, and what a table cannot hold: events and the program frame."""
+        findings = super().preflight(program)
+        twice = [name for name in program.columns if name.lower() in COLUMNS]
+        findings += [
+            Finding(608, Level.FAIL, f"the column {name!r} is one of the table's own; rename it") for name in twice
+        ]
+        counts = Counter(event.kind for event in program.path.events)
+        if counts:
+            told = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items()))
+            findings.append(Finding(610, Level.INFO, f"a table holds moves only; events not written: {told}"))
+        remedy = "apply T_scan_program of the result to them"
+        return [
+            *findings,
+            *name_findings(program, file_stem(program.name)),
+            *frame_findings(program, Level.INFO, remedy),
+        ]
+
+    def files(self, program: Program) -> dict[str, bytes]:
+        """Return the one table."""
+        path = program.path
+        numbers = np.column_stack(
+            [
+                rounded(path.tips_mm, _POSITION_DECIMALS),
+                rounded(path.axes, _AXIS_DECIMALS),
+                rounded(path.feeds_mm_min, _FEED_DECIMALS),
+            ]
+        )
+        extras = [rounded(np.asarray(c, np.float64), _COLUMN_DECIMALS).tolist() for c in program.columns.values()]
+        row = ",".join(
+            [f"%.{_POSITION_DECIMALS}f"] * 3
+            + [f"%.{_AXIS_DECIMALS}f"] * 3
+            + [f"%.{_FEED_DECIMALS}f", "%d", "%s"]
+            + [f"%.{_COLUMN_DECIMALS}f"] * len(extras)
+        )
+        cells = zip(*numbers.T.tolist(), path.rapid.tolist(), program.status, *extras, strict=True)
+        flat = [cell for line in cells for cell in line]
+        table = ",".join((*COLUMNS, *program.columns)) + "\n" + _formatted(row + "\n", flat, len(COLUMNS) + len(extras))
+        return {f"{file_stem(program.name)}.csv": table.encode("ascii")}
+
+
+def _formatted(row: str, cells: list[object], width: int) -> str:
+    """Format rows in chunks: one formatting of thousands of cells is faster than thousands of formattings."""
+    step = _CHUNK_ROWS * width
+    chunks = (cells[start : start + step] for start in range(0, len(cells), step))
+    return "".join((row * (len(chunk) // width)) % tuple(chunk) for chunk in chunks)

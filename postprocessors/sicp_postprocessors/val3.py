@@ -1,0 +1,158 @@
+"""Stäubli VAL3: an application folder for CS8C (s7) and CS9 (s8) controllers.
+
+The rigid part of a correction can stay in the frame `fPart`, where the operator sees it; the points then hold the rest.
+"""
+
+from __future__ import annotations
+
+import re
+
+from sicp_cam.findings import Finding, Level
+from sicp_cam.model import EventKind, FloatArray, Program
+from sicp_postprocessors.base import SAFETY_NOTE, Postprocessor, failures
+from sicp_postprocessors.checks import event_findings, first_move_findings, name_findings
+from sicp_postprocessors.numbers import LARGEST, trimmed
+from sicp_postprocessors.text import ascii_name
+from sicp_postprocessors.val3_code import (
+    closing,
+    comments,
+    event_statements,
+    event_variables,
+    move_statements,
+    programs_of,
+    stopping,
+    tool_names,
+)
+from sicp_postprocessors.val3_findings import cell_findings, flange_findings, spindle_findings, tool_findings
+from sicp_postprocessors.val3_motion import motion_of
+from sicp_postprocessors.val3_options import Six, Val3Options
+from sicp_postprocessors.val3_poses import pose_from_six, six_from_pose
+from sicp_postprocessors.val3_xml import Variable, data_file, program_file, project_file
+
+__all__ = ["Val3", "Val3Options", "application_name"]
+
+_LONGEST_NAME = 15
+_ZERO: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+# The language's own words, and the names that Windows keeps for devices: the folder is copied with it.
+_RESERVED = re.compile(
+    r"begin|end(if|for|while|switch)?|if|then|else(if)?|for|to|step|do|while|until|switch|case|default|break|call|return"
+    r"|and|or|xor|not|true|false|world|flange|start|stop|global|void|num|bool|string|dio|aio|sio|frame|tool|trsf"
+    r"|(point|joint)(rx|rs)?|mdesc|config|con|prn|aux|nul|(com|lpt)[1-9]",
+    re.IGNORECASE,
+)
+
+
+class Val3(Postprocessor):
+    """VAL3 application: project, data, `start`, `stop`, and further programs where the path is long.
+
+    One `pointRx` for each move, in the frame `fPart`; straight moves at the feed of the path; outputs after the arm has
+    come to rest. Only instructions that CS8C and CS9 share.
+    """
+
+    name = "val3"
+    summary = "Staubli VAL3 application folder (s7 XML) for CS8C and CS9 controllers"
+    Options = Val3Options
+    options: Val3Options
+
+    def preflight(self, program: Program) -> list[Finding]:
+        """Return the findings of every post, and what the operator must set or know before the robot moves."""
+        findings = super().preflight(program)
+        if failures(findings):
+            return findings
+        path = program.path
+        findings += [
+            *name_findings(program, application_name(program.name)),
+            *first_move_findings(path),
+            *event_findings(path, {EventKind.OTHER}, "it is a word of another controller"),
+            *cell_findings(path, self.options),
+            *spindle_findings(path, self.options),
+            *tool_findings(path),
+            *flange_findings(path, self.options),
+        ]
+        if not abs(self._world_program(program)[:3, 3]).max() <= LARGEST:
+            findings.append(Finding(605, Level.FAIL, f"the frame fPart lies beyond {LARGEST:g} mm; check option cell"))
+        return findings
+
+    def files(self, program: Program) -> dict[str, bytes]:
+        """Return the application folder."""
+        application = application_name(program.name)
+        motion = motion_of(program.path, self.options)
+        tools = tool_names(program.path)
+        programs = self._programs(program, move_statements(motion, tools))
+        variables = [
+            Variable("fPart", "frame", [_pose(six_from_pose(self._world_program(program)), "world[0]")]),
+            *self._tools(tools),
+            *event_variables(program.path, self.options),
+            *motion.variables,
+        ]
+        files = {f"{name}.pgx": program_file(name, code) for name, code in programs.items()}
+        data = f"{application}.dtx"
+        files |= {
+            f"{application}.pjx": project_file(self.options.version, files, data),
+            data: data_file(variables),
+        }
+        return {f"{application}/{file}": content for file, content in sorted(files.items())}
+
+    def _programs(self, program: Program, moves: list[str]) -> dict[str, list[str]]:
+        """Return the statements of every program by its name, start and stop among them."""
+        path = program.path
+        events = event_statements(path, self.options)
+        stretches = programs_of(path.rapid, self.options.max_moves_per_program)
+        bodies = []
+        for stretch in stretches:
+            body = [line for i in stretch for line in (*events.get(i, []), moves[i])]
+            bodies.append(body + (events.get(len(path), []) if stretch.stop == len(path) else []))
+        # What an aborted run left in the motion queue must not move the arm now.
+        head = [*self._head(program), "resetMotion()"]
+        if len(bodies) == 1:
+            return {"start": [*head, *bodies[0], *closing(path)], "stop": stopping(path)}
+        parts = {f"move{number:03d}": body for number, body in enumerate(bodies)}
+        calls = [f"call {name}()" for name in parts]
+        return {"start": [*head, *calls, *closing(path)], "stop": stopping(path), **parts}
+
+    def _head(self, program: Program) -> list[str]:
+        options = self.options
+        if options.world_origin == "shoulder":
+            world = "world is at the shoulder (axes 1 and 2), not on the base plate; cell was measured from there"
+        else:
+            height = trimmed(options.shoulder_height_mm, 3)
+            world = f"world is at the shoulder; cell was measured from the base plate, {height} mm below, and shifted"
+        remarks = [
+            program.name,
+            *program.notes,
+            SAFETY_NOTE,
+            world,
+            "points: mm and degrees, R = Rx Ry Rz, in frame fPart; tool Z points out of the flange into the work",
+        ]
+        if options.first_run:
+            speed = trimmed(options.first_run_mm_s, 3)
+            remarks.append(f"first run: no blending, no move faster than {speed} mm/s")
+        return [line for remark in remarks for line in comments(remark)]
+
+    def _world_program(self, program: Program) -> FloatArray:
+        """Return the pose of the program frame in VAL3's world, whose origin is the shoulder."""
+        pose = pose_from_six(self.options.cell or _ZERO) @ program.T_scan_program
+        pose[2, 3] -= self.options.shoulder_height_mm
+        return pose
+
+    def _tools(self, names: list[str]) -> list[Variable]:
+        # Every VAL3 tool names an output for a gripper; valve1 is the one that each controller has.
+        pose = _pose(self.options.tool or _ZERO, "flange[0]") | {"ioLink": "valve1"}
+        return [Variable(name, "tool", [pose]) for name in dict.fromkeys(names)]
+
+
+def application_name(name: str) -> str:
+    """Return a program name as VAL3 takes it for an application: 15 letters and digits, a letter first.
+
+    >>> application_name("trim_porthole-left side 2"), application_name("start")
+    ('trimportholelef', 'startApp')
+    """
+    plain = ascii_name(name, _LONGEST_NAME)
+    return f"{plain}App" if _RESERVED.fullmatch(plain) else plain
+
+
+def _pose(six: tuple[float, ...], father: str) -> dict[str, str]:
+    decimals = (6, 6, 6, 9, 9, 9)
+    names = ("x", "y", "z", "rx", "ry", "rz")
+    values = {name: trimmed(v, d) for name, v, d in zip(names, six, decimals, strict=True)}
+    return values | {"fatherId": father}

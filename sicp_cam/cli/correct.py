@@ -1,0 +1,143 @@
+"""`sicp-cam correct`: the main job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+from cyclopts import Parameter
+
+from sicp_cam.cli.progress import progress_shown
+from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
+
+__all__ = ["correct"]
+
+_Switch: TypeAlias = Annotated[bool | None, Parameter(negative="")]
+_Several: TypeAlias = Annotated[list[str] | None, Parameter(negative="")]
+
+
+def correct(
+    job: Path | None = None,
+    /,
+    *,
+    cad: str | None = None,
+    scan: str | None = None,
+    path: str | None = None,
+    post: _Several = None,
+    out: str | None = None,
+    name: str | None = None,
+    method: str | None = None,
+    contour: str | None = None,
+    align: str | None = None,
+    frame: str | None = None,
+    cad_units: str | None = None,
+    scan_units: str | None = None,
+    path_units: str | None = None,
+    report: _Several = None,
+    set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
+    override: _Several = None,
+    dry_run: _Switch = None,
+    force: _Switch = None,
+    strict: _Switch = None,
+    as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
+    talk: Talk = Talk(),  # noqa: B008  # frozen
+) -> int:
+    """Correct a tool path to the scanned shape of its part, and write programs, report and result.
+
+    Every option is a key of the job file too. The command line has precedence over SICP_* variables, and those over the
+    job file.
+
+    Parameters
+    ----------
+    job
+        Job file (TOML); file names in it are relative to its folder.
+    cad
+        Nominal part: STEP, or a mesh.
+    scan
+        Scan of the part: PLY, STL, or points as text.
+    path
+        Tool path: APT or CL data, G-code, CSV.
+    post
+        Postprocessors, separated by commas: val3, gcode, csv, ... (see sicp-cam plugins).
+    out
+        Folder for the results; made if it does not exist.
+    name
+        Stem of the output files and name of the program.
+    method
+        How the deformation is found: sicp, rigid, paper.
+    contour
+        Contours to register: auto, or their numbers separated by commas (see sicp-cam inspect).
+    align
+        Where the part lies in the scan: auto (found from the geometry), given (already there, roughly), or a file with
+        the rough 4x4 matrix T_scan_part or with datum pairs.
+    frame
+        Frame of the program's coordinates: scan or part.
+    cad_units
+        Unit of the nominal part, where its file does not state one: mm, cm, m, inch.
+    scan_units
+        Unit of the scan.
+    path_units
+        Unit of the path.
+    report
+        Report pages, separated by commas: pdf, png; or none.
+    set_
+        KEY=VALUE: any other setting, such as registration.segments=14, gates.coverage=0.8, scan.decimal=,
+        path.feed_mm_min=1500 or post.val3.spin_deg=90. May be repeated.
+    override
+        A gate that may be broken; it is named in the program and the report. May be repeated.
+    dry_run
+        Do everything but write.
+    force
+        Replace existing results.
+    strict
+        Let warnings end the run with exit code 7.
+    as_json
+        Print the result as one JSON document.
+    talk
+        How much is said.
+    """
+    flags: dict[str, object] = {
+        "cad": cad,
+        "scan": scan,
+        "path": path,
+        "post": _joined(post),
+        "out": out,
+        "name": name,
+        "method": method,
+        "contour": contour,
+        "align": align,
+        "frame": frame,
+        "cad_units": cad_units,
+        "scan_units": scan_units,
+        "path_units": path_units,
+        "report": _joined(report),
+        "override": _joined(override),
+        "dry_run": dry_run,
+        "force": force,
+        "strict": strict,
+    }
+    with logging_to(talk):
+        return reported(lambda: _run(job, flags, set_ or [], as_json, talk.quiet), as_json=as_json)
+
+
+def _run(job_file: Path | None, flags: dict[str, object], pairs: list[str], as_json: bool, quiet: bool) -> int:
+    from sicp_cam.job import build
+    from sicp_cam.job_layers import environment, load, settings
+
+    stated = settings(flags, pairs)
+    job = build(*([load(job_file)] if job_file else []), environment(), stated)
+
+    from sicp_cam import pipeline  # heavy, so only when the job is sound
+
+    with progress_shown(quiet) as progress:
+        outcome = pipeline.correct(job, progress)
+    if as_json:
+        say_json(outcome.document)
+    else:
+        for line in outcome.lines:
+            say(line)
+    return outcome.exit_code
+
+
+def _joined(words: list[str] | None) -> str | None:
+    return None if words is None else ",".join(words)

@@ -1,0 +1,164 @@
+"""Curves over the arc length of a contour: the error before and after, and what was corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import matplotlib.style
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.patches import Patch
+
+from sicp_cam.model import FloatArray
+from sicp_cam.registration.result import RegisteredContour
+from sicp_cam.report.lettering import STYLE, png
+from sicp_cam.report.result_tables import METHODS
+from sicp_cam.report.statistics import both
+from sicp_cam.report.stretches import clipped, marked
+
+__all__ = ["correction_along_contour", "error_along_contour"]
+
+BEFORE, AFTER, GAP = "#c8782c", "#1f4fa3", "#f3d9dc"
+INTO, OUT, TURN = "#2f7d4f", "#7a3f98", "#444444"
+
+
+def error_along_contour(contour: RegisteredContour, method: str, tolerance_mm: float | None = None) -> bytes:
+    """Return the PNG of the registration error over arc length, rigid against the method (the paper's figure 10).
+
+    Three panels: the distance across the contour, then its parts in the surface and out of it. Stretches that the scan
+    does not show are shaded and have no curve; subdivision points are ticks at the top.
+
+    Parameters
+    ----------
+    contour
+        The registered contour.
+    method
+        Name of the method that `contour.after` belongs to; with `rigid` there is one curve only.
+    tolerance_mm
+        Drawn as a dashed line, if given.
+    """
+    titles = (
+        "distance across the contour / mm",
+        "normal: + into the material / mm",
+        "out of the surface: + outward / mm",
+    )
+    before = (both(contour.before), contour.before.normal_mm, contour.before.out_mm)
+    after = (both(contour.after), contour.after.normal_mm, contour.after.out_mm)
+
+    def draw(axes: list[Axes]) -> None:
+        for index, (panel, title) in enumerate(zip(axes, titles, strict=True)):
+            _curve(panel, contour, np.where(contour.covered, before[index], np.nan), BEFORE)
+            if method != "rigid":
+                _curve(panel, contour, np.where(contour.covered, after[index], np.nan), AFTER)
+            _tolerance(panel, tolerance_mm, both_signs=index > 0)
+            panel.set_ylabel(title)
+        axes[0].set_ylim(bottom=0.0)
+
+    keys = [("rigid ICP", BEFORE)] + ([(METHODS.get(method, method), AFTER)] if method != "rigid" else [])
+    return _figure(f"Contour {contour.number}: registration error along the contour", contour, 3, draw, keys)
+
+
+def correction_along_contour(contour: RegisteredContour) -> bytes:
+    """Return the PNG of the correction beyond the rigid pose over arc length: shift inward and outward, and turn."""
+    shift = contour.corrected.points_mm - contour.rigid.points_mm
+    into = np.sum(shift * contour.rigid.inward, axis=1)
+    out = np.sum(shift * contour.rigid.outward, axis=1)
+    sine = np.linalg.norm(np.cross(contour.rigid.outward, contour.corrected.outward), axis=1)
+    turn = np.degrees(np.arctan2(sine, np.sum(contour.rigid.outward * contour.corrected.outward, axis=1)))
+
+    def draw(axes: list[Axes]) -> None:
+        _curve(axes[0], contour, into, INTO)
+        _curve(axes[0], contour, out, OUT)
+        axes[0].set_ylabel("shift / mm")
+        _curve(axes[1], contour, turn, TURN)
+        axes[1].set_ylabel("turn of the outward normal / deg")
+        axes[1].set_ylim(bottom=0.0)
+
+    keys = [
+        ("into the material (normal)", INTO),
+        ("outward (out)", OUT),
+        ("turn of the outward normal", TURN),
+    ]
+    title = f"Contour {contour.number}: correction of the path beyond the rigid pose"
+    return _figure(title, contour, 2, draw, keys)
+
+
+def _figure(
+    title: str,
+    contour: RegisteredContour,
+    panels: int,
+    draw: Callable[[list[Axes]], None],
+    keys: list[tuple[str, str]],
+) -> bytes:
+    with matplotlib.style.context(list(STYLE)):
+        figure = Figure(
+            figsize=(16, 2.6 + 2.8 * panels),
+            dpi=100,
+            facecolor="white",
+            layout=ConstrainedLayoutEngine(w_pad=0.15, h_pad=0.08),
+        )
+        canvas = FigureCanvasAgg(figure)
+        axes = list(figure.subplots(panels, 1, sharex=True))
+        draw(axes)
+        gaps = _shade(axes, contour)
+        _splits(axes[0], contour)
+        axes[-1].set_xlabel("arc length on the nominal contour / mm")
+        axes[-1].set_xlim(0.0, contour.nominal.length_mm)
+        figure.suptitle(title, fontsize=18, weight="bold", x=0.02, ha="left", parse_math=False)
+        handles = [Patch(color=colour, label=text) for text, colour in keys]
+        if gaps:
+            handles.append(Patch(color=GAP, label="not seen by the scan"))
+        figure.legend(handles=handles, loc="outside lower left", ncols=4, frameon=False, fontsize=13)
+        return png(canvas)
+
+
+def _curve(panel: Axes, contour: RegisteredContour, values: FloatArray, colour: str) -> None:
+    """Draw a value per station, with a break where it is NaN, and a loop closed over its seam."""
+    s = contour.nominal.s_mm
+    if contour.nominal.closed:
+        s, values = np.append(s, contour.nominal.length_mm), np.append(values, values[0])
+    panel.plot(s, values, color=colour, lw=1.4)
+
+
+def _tolerance(panel: Axes, tolerance_mm: float | None, *, both_signs: bool) -> None:
+    """Draw the tolerance where it lies within the curves' range: it must not squeeze them flat."""
+    if both_signs:
+        panel.axhline(0.0, color="#808080", lw=0.8)
+    if tolerance_mm is None:
+        return
+    for value in (tolerance_mm, -tolerance_mm) if both_signs else (tolerance_mm,):
+        low, high = panel.get_ylim()
+        if low <= value <= high:
+            panel.axhline(value, color="#606060", lw=1.0, ls="--")
+            panel.annotate(
+                f"tolerance {value:g}",
+                (1.0, value),
+                xycoords=("axes fraction", "data"),
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=10,
+                color="#606060",
+            )
+
+
+def _shade(axes: list[Axes], contour: RegisteredContour) -> bool:
+    gaps = marked(contour.nominal, ~contour.covered)
+    for gap in gaps:
+        for start, end in clipped(gap, contour.nominal.length_mm):
+            for panel in axes:
+                panel.axvspan(start, end, color=GAP, lw=0, zorder=0.5)
+    return bool(gaps)
+
+
+def _splits(panel: Axes, contour: RegisteredContour) -> None:
+    if len(contour.split_s_mm) == 0:
+        return
+    top = panel.secondary_xaxis("top")
+    top.set_zorder(3)
+    top.set_xticks(contour.split_s_mm.tolist(), labels=["" for _ in contour.split_s_mm])
+    top.tick_params(length=9, width=1.5, direction="in")
+    top.set_xlabel("ticks: borders of the segments", fontsize=11)

@@ -1,0 +1,141 @@
+"""Gates: limits that a registration and a corrected path must keep before any program is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sicp_cam.contour.frames import FramedCurve
+from sicp_cam.model import BoolArray, FloatArray, Status
+from sicp_cam.registration.result import RegisteredContour
+from sicp_cam.toolpath.settings import GateLimits
+from sicp_cam.toolpath.transfer import CorrectedPath
+
+__all__ = ["GATE_NAMES", "Gate", "overridden", "path_gates", "registration_gates"]
+
+SLOPE = 0.1
+"""Change of the correction per millimetre of path that a bent part explains."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """One limit and how it was kept.
+
+    Parameters
+    ----------
+    name
+        The name that `--override` takes.
+    value, limit
+        In the unit that `text` names.
+    state
+        `ok`, `fail` or `overridden`.
+    text
+        What the value is, in words.
+    """
+
+    name: str
+    value: float
+    limit: float
+    state: str
+    text: str
+
+
+GATE_NAMES = (
+    "coverage",
+    "residual_mm",
+    "edge_residual_mm",
+    "stretch",
+    "path_distance_mm",
+    "correction_mm",
+    "axis_deg",
+    "jump_mm",
+)
+
+
+def registration_gates(contours: Sequence[RegisteredContour], limits: GateLimits) -> tuple[Gate, ...]:
+    """Judge the registration: how much of the contour was seen, how well it fits, and that it was not stretched."""
+    coverage = min(float(contour.covered.mean()) for contour in contours)
+    out = max(_mean_size(contour.after.out_mm) for contour in contours)
+    normal = max(_mean_size(contour.after.normal_mm) for contour in contours)
+    stretch = max(abs(_length(contour.corrected) / _length(contour.nominal) - 1.0) for contour in contours)
+    return (
+        _at_least("coverage", coverage, limits.coverage, "fraction of the contour on which the scan shows the edge"),
+        _at_most("residual_mm", out, limits.residual_mm, "mean distance of scan and contour out of the surface, mm"),
+        _at_most("edge_residual_mm", normal, limits.edge_residual_mm, "mean distance of scan edge and contour, mm"),
+        _at_most("stretch", stretch, limits.stretch, "relative change of the contour's length"),
+    )
+
+
+def path_gates(corrected: CorrectedPath, distance_mm: FloatArray, limits: GateLimits) -> tuple[Gate, ...]:
+    """Judge the corrected path: how far its points and axes were moved, and how evenly.
+
+    Parameters
+    ----------
+    corrected
+        The path before and after.
+    distance_mm
+        (m,) distance of each feed move of the source from the contour that it follows.
+    limits
+        The limits.
+    """
+    cuts = np.array([status is not Status.APPROACH for status in corrected.status])
+    change = corrected.corrected.tips_mm - corrected.rigid.tips_mm
+    size = np.linalg.norm(change, axis=1)
+    cosine = np.clip(np.sum(corrected.corrected.axes * corrected.rigid.axes, axis=1), -1.0, 1.0)
+    return (
+        _at_most(
+            "path_distance_mm",
+            float(np.median(distance_mm)) if len(distance_mm) else np.inf,
+            limits.path_distance_mm,
+            "median distance of the feed moves from the contour, mm",
+        ),
+        _at_most(
+            "correction_mm", float(size.max()), limits.correction_mm, "largest correction beyond the rigid pose, mm"
+        ),
+        _at_most(
+            "axis_deg",
+            float(np.degrees(np.arccos(cosine)).max()),
+            limits.axis_deg,
+            "largest turn of the tool axis beyond the rigid pose, degrees",
+        ),
+        _at_most(
+            "jump_mm",
+            _largest_jump(change, corrected.nominal.tips_mm, cuts),
+            limits.jump_mm,
+            "largest step of the correction between neighbouring points, mm",
+        ),
+    )
+
+
+def overridden(gates: Iterable[Gate], names: Iterable[str]) -> tuple[Gate, ...]:
+    """Return the gates with those failed ones marked that the operator named."""
+    allowed = set(names)
+    return tuple(
+        replace(gate, state="overridden") if gate.state == "fail" and gate.name in allowed else gate for gate in gates
+    )
+
+
+def _at_most(name: str, value: float, limit: float, text: str) -> Gate:
+    return Gate(name, value, limit, "ok" if value <= limit else "fail", text)
+
+
+def _at_least(name: str, value: float, limit: float, text: str) -> Gate:
+    return Gate(name, value, limit, "ok" if value >= limit else "fail", text)
+
+
+def _mean_size(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.abs(known).mean()) if len(known) else np.inf
+
+
+def _length(curve: FramedCurve) -> float:
+    points = np.vstack([curve.points_mm, curve.points_mm[:1]]) if curve.closed else curve.points_mm
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def _largest_jump(change: FloatArray, tips_mm: FloatArray, cuts: BoolArray) -> float:
+    both = cuts[1:] & cuts[:-1]
+    step = np.linalg.norm(np.diff(change, axis=0), axis=1) - SLOPE * np.linalg.norm(np.diff(tips_mm, axis=0), axis=1)
+    return float(np.max(step[both], initial=0.0))

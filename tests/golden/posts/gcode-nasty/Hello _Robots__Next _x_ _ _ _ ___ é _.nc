@@ -1,0 +1,19 @@
+%
+(Hello "Robots" Next x ' ]]> e ?)
+(Hello "Robots" Next x ' ]]> e ?)
+(]0x bell)
+(- msg,active)
+(not a safety function: verify at reduced speed)
+(units mm, orientation vector, dwell in seconds)
+G21 G90 G94 G17 G40
+G49
+T1 M6
+(Hello "Robots" Next x ' ]]> e ?)
+G43.5 H1
+G0 X0.0000 Y0.0000 Z5.0000 I0.287348 J0.000000 K0.957826
+(Hello "Robots" Next x ' ]]> e ?)
+M0
+G1 X10.0000 Y0.0000 Z5.0000 I0.155255 J0.241795 K0.957826 F600
+G49
+M30
+%

@@ -1,0 +1,240 @@
+import doctest
+import importlib
+import pkgutil
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pytest
+from post_programs import path_of, program_of, simple_program, straight_program
+
+import sicp_postprocessors
+from sicp_cam.errors import JobError, OutputError, PathError
+from sicp_cam.findings import Level
+from sicp_cam.model import Event, EventKind
+from sicp_postprocessors.base import LinePostprocessor, Postprocessor
+from sicp_postprocessors.checks import common_findings, event_findings, move_place, stretch_findings
+from sicp_postprocessors.numbers import fixed, rounded
+from sicp_postprocessors.options import build_options, outside
+from sicp_postprocessors.text import ascii_line, ascii_lines, ascii_name, file_stem
+
+
+@pytest.mark.parametrize("module", [m.name for m in pkgutil.iter_modules(sicp_postprocessors.__path__)])
+def test_examples_in_docstrings_run(module):
+    results = doctest.testmod(importlib.import_module(f"sicp_postprocessors.{module}"))
+    assert results.failed == 0
+
+
+def test_the_example_of_a_third_party_is_run():
+    assert doctest.testmod(importlib.import_module("sicp_postprocessors.base")).attempted >= 10
+
+
+class TestNumbers:
+    @pytest.mark.parametrize(
+        ("value", "decimals", "text"),
+        [
+            (-0.0004, 3, "0.000"),
+            (-0.0, 4, "0.0000"),
+            (1e-9, 4, "0.0000"),
+            (-1.5, 0, "-2"),
+            (1234567.891, 3, "1234567.891"),
+            (-0.001, 3, "-0.001"),
+            (1e7, 1, "10000000.0"),
+        ],
+    )
+    def test_fixed(self, value, decimals, text):
+        assert fixed(value, decimals) == text
+
+    @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e22, -1.1e7])
+    def test_numbers_that_no_program_may_hold(self, value):
+        with pytest.raises(PathError, match="cannot be written"):
+            fixed(value, 3)
+        with pytest.raises(PathError, match="cannot be written"):
+            rounded(np.array([0.0, value]), 3)
+
+    def test_rounded_has_no_minus_zero(self):
+        assert not np.signbit(rounded(np.array([-1e-9, -0.0]), 4)).any()
+
+
+class TestText:
+    def test_nasty_text_is_one_plain_line(self):
+        line = ascii_line('Hello "Robots"\nNext\x1b\u2028(x)\r é 😀')
+        assert line == 'Hello "Robots" Next (x) e ?'
+
+    def test_long_text_is_broken_and_not_cut(self):
+        words = [f"word{n}" for n in range(60)]
+        lines = ascii_lines(" ".join(words))
+        assert max(map(len, lines)) <= 72
+        assert " ".join(lines).split() == words
+
+    @pytest.mark.parametrize(
+        "name",
+        ["../../etc/passwd", "/abs", "a\\b", "CON", "con.txt", "nul", "a" * 300, "😀" * 300, ".", "..", "", " . ",
+         "a\0b", "-rf", "x.", "\ud800", "é" * 200],
+    )  # fmt: skip
+    def test_file_stems_stay_in_their_folder(self, name):
+        stem = file_stem(name)
+        assert stem and len(stem.encode()) <= 130
+        assert not set('/\\:*?"<>|\0') & set(stem)
+        assert stem[0] not in ".- " and stem[-1] not in ". "
+        assert stem.split(".")[0].lower() not in ("con", "nul")
+
+    @pytest.mark.parametrize("name", ["9x", "é😀", "", "_", "a b-c", "x" * 40])
+    def test_names_of_a_controller(self, name):
+        assert ascii_name(name, 15).isalnum()
+        assert ascii_name(name, 15)[0].isalpha() and len(ascii_name(name, 15)) <= 15
+
+
+@dataclass(frozen=True)
+class Everything:
+    flag: bool = False
+    count: int = 1
+    size_mm: float = 1.0
+    word: str = ""
+    kind: Literal["a", "b"] = "a"
+    pair: tuple[float, float] | None = None
+
+    def __post_init__(self):
+        problems = outside("count", self.count, 0, 5)
+        if problems:
+            raise JobError(*problems)
+
+
+class TestOptions:
+    def test_strings_become_the_type_of_their_field(self):
+        given = {"flag": "true", "count": "3", "size_mm": "2000", "word": "x", "kind": "b", "pair": "1,-2.5"}
+        assert build_options("p", Everything, given) == Everything(True, 3, 2000.0, "x", "b", (1.0, -2.5))
+
+    def test_values_of_the_own_type_are_kept(self):
+        given = {"flag": True, "count": 3, "size_mm": 2, "pair": [1, 2.5]}
+        assert build_options("p", Everything, given) == Everything(True, 3, 2.0, pair=(1.0, 2.5))
+        assert build_options("p", Everything, {"pair": "none"}).pair is None
+
+    @pytest.mark.parametrize(
+        ("name", "value"),
+        [("flag", "maybe"), ("flag", 2), ("count", "1.5"), ("count", True), ("count", 1.0), ("count", "1_0"),
+         ("count", "٣"), ("size_mm", "nan"), ("size_mm", float("inf")), ("size_mm", "1e999"), ("size_mm", "1,5"),
+         ("size_mm", True), ("size_mm", None), ("word", 3), ("word", "a\nb"), ("word", "é"),
+         ("kind", "c"), ("kind", ["a"]), ("pair", "1,2,3"), ("pair", 4), ("pair", ["x", 1]), ("count", 9)],
+    )  # fmt: skip
+    def test_wrong_values_are_refused_by_name(self, name, value):
+        with pytest.raises(JobError, match=f"'{name}'"):
+            build_options("p", Everything, {name: value})
+
+    def test_all_problems_are_told_at_once(self):
+        with pytest.raises(JobError) as caught:
+            build_options("p", Everything, {"flg": 1, "kind": "z", "count": 99})
+        assert len(caught.value.problems) == 3
+        told = str(caught.value)
+        assert "no option 'flg'" in told and "one of a, b" in told and "from 0 to 5" in told
+
+
+class TestChecks:
+    def test_a_good_program_has_no_findings(self):
+        assert common_findings(simple_program()) == []
+
+    def test_empty_path(self):
+        (finding,) = common_findings(program_of(path_of(np.zeros((0, 3)), np.zeros((0, 3)))))
+        assert (finding.code, finding.level) == (601, Level.FAIL)
+
+    def test_missing_feeds_are_told_by_stretch_with_lines_and_remedy(self):
+        path = path_of(np.eye(3).repeat(2, 0), [[0, 0, 1]] * 6, [0, 0, 0, 5, 0, 5], [True] + [False] * 5)
+        findings = common_findings(program_of(path))
+        assert [f.where for f in findings] == ["moves 1 to 2, lines 11 to 12", "move 4, line 14"]
+        assert all(f.code == 603 and "--set path.feed_mm_min=" in f.message for f in findings)
+
+    @pytest.mark.parametrize("feed", [np.nan, np.inf, -1.0])
+    def test_feeds_that_are_no_feeds(self, feed):
+        (finding,) = common_findings(program_of(path_of(np.eye(3), [[0, 0, 1]] * 3, [1.0, feed, 1.0])))
+        assert (finding.code, finding.where) == (602, "move 1, line 11")
+
+    def test_axes_coordinates_frame_and_columns(self):
+        path = path_of([[0, 0, 0], [2e7, 0, 0]], [[0, 0, 1.1], [0, 0, 1]])
+        mirrored = np.diag([1.0, 1.0, -1.0, 1.0])
+        columns = {"ok": np.zeros(2), "short": np.zeros(1), "nan": np.array([0, np.nan]), "a,b": np.zeros(2)}
+        findings = common_findings(program_of(path, T_scan_program=mirrored, columns=columns))
+        assert [(f.code, f.where) for f in findings[:2]] == [(604, "move 0, line 10"), (605, "move 1, line 11")]
+        assert [f.code for f in findings[2:]] == [607, 608, 608, 608]
+        assert all(f.level is Level.FAIL for f in findings)
+
+    @pytest.mark.parametrize(
+        ("event", "words"),
+        [
+            (Event(4, EventKind.STOP), "outside"),
+            (Event(-1, EventKind.STOP), "outside"),
+            (Event(1, EventKind.DWELL, np.nan), "not finite"),
+            (Event(1, EventKind.DWELL, -1.0), "negative"),
+            (Event(1, EventKind.TOOL, 1.5), "not whole"),
+            (Event(1, EventKind.SPINDLE, 1e9), "beyond"),
+        ],
+    )
+    def test_events_that_are_none(self, event, words):
+        (finding,) = common_findings(straight_program(3, events=(event,)))
+        assert finding.code == 606 and words in finding.message and f"before move {event.before_move}" in finding.where
+
+    def test_events_left_out_are_told_once_for_each_text(self):
+        events = [Event(i, EventKind.OTHER, 0.0, text, i + 5) for i, text in enumerate(["G49", "a\nb", "G49"])]
+        findings = event_findings(straight_program(3, events=tuple(events)).path, {EventKind.OTHER}, "why")
+        assert [f.where for f in findings] == ["before move 0, line 5, and 1 more", "before move 1, line 6"]
+        assert all(f.code == 610 and f.level is Level.WARN and "\n" not in f.message for f in findings)
+
+    def test_places(self):
+        path = path_of(np.eye(3), [[0, 0, 1]] * 3, lines=[0, 5, 6])
+        assert move_place(path, 0) == "move 0"
+        assert move_place(path, 1, 2) == "moves 1 to 2, lines 5 to 6"
+        assert stretch_findings(path, np.array([False] * 3), 1, Level.INFO, "x") == []
+
+
+class Plain(LinePostprocessor):
+    name = "plain"
+    summary = "for the tests"
+    suffix = ".txt"
+    line_text = "line"
+
+    def begin(self, program):
+        yield "begin"
+
+    def move(self, move, previous):
+        yield f"{move.index} after {previous.index if previous else None}"
+
+    def event(self, event):
+        yield self.line_text
+
+    def end(self, program):
+        yield "end"
+
+
+class TestTemplate:
+    def test_moves_and_events_come_in_order(self):
+        events = (Event(2, EventKind.STOP), Event(0, EventKind.STOP), Event(1, EventKind.OTHER))
+        (content,) = Plain().write(straight_program(2, events=events)).values()
+        assert content.decode().split("\n") == ["begin", "line", "0 after None", "1 after 0", "line", "end", ""]
+
+    @pytest.mark.parametrize("text", ["two\nlines", "é", "\x1b"])
+    def test_a_hook_that_returns_no_plain_line_is_stopped(self, text):
+        post = Plain()
+        post.line_text = text
+        with pytest.raises(OutputError, match="post plain wrote a line"):
+            post.write(straight_program(2, events=(Event(0, EventKind.STOP),)))
+
+    def test_a_failure_in_preflight_stops_the_program_with_every_place(self):
+        path = path_of(np.eye(3).repeat(3, 0), [[0, 0, 1]] * 9, [0, 5] * 4 + [0])
+        with pytest.raises(PathError, match=r"move 0, line 10: .*; move 2, line 12: ") as caught:
+            Plain().write(program_of(path, name="a\nb"))
+        assert "\n" not in str(caught.value)
+
+    def test_more_failures_than_a_line_takes_are_counted(self):
+        path = path_of(np.tile(np.eye(3), (5, 1)), [[0, 0, 1]] * 15, [0, 5] * 7 + [0])
+        with pytest.raises(PathError, match=r"and 3 more$"):
+            Plain().write(program_of(path))
+
+    @pytest.mark.parametrize("file", ["/etc/x", "../x", "a/../../x", "a\\b", ""])
+    def test_a_post_cannot_leave_its_folder(self, file):
+        class Escaping(Postprocessor):
+            name, summary = "escaping", "for the tests"
+
+            def files(self, program):
+                return {file: b""}
+
+        with pytest.raises(OutputError, match="outside its folder"):
+            Escaping().write(straight_program(2))

@@ -1,0 +1,186 @@
+"""What all posts must do alike: golden files, nasty text, numbers that are none, same bytes again."""
+
+import dataclasses
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from post_programs import NASTY, nasty_program, path_of, program_of, simple_program, straight_program
+from post_reread import load_val3
+
+from sicp_cam.errors import JobError, PathError
+from sicp_cam.model import Event, EventKind
+from sicp_cam.rigid_motion import exponential
+from sicp_postprocessors.gcode import GCode
+from sicp_postprocessors.path_csv import PathCsv
+from sicp_postprocessors.val3 import Val3
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "posts"
+POSE = exponential(np.array([0.1, -0.2, 0.3, 100.0, -50.0, 25.0]), np.zeros(3))
+LINKED = {
+    "tool": "0,0,150,0,0,0",
+    "cell": "500,0,200,0,0,90",
+    "world_origin": "base_plate",
+    "shoulder_height_mm": "478",
+    "blend": "Cartesian",
+    "max_points_per_array": "4",
+    "max_moves_per_program": "3",
+    "spindle_link": "BasicIO-1\\%Q0",
+    "coolant_link": "BasicIO-1\\%Q1",
+    "continue_link": "BasicIO-1\\%I0",
+    "spindle_speed": "num",
+    "log_messages": "true",
+    "shoulder": "lefty",
+}
+CASES = {
+    "csv": lambda: PathCsv().write(simple_program(columns={"uncertainty_mm": np.arange(6) / 7.0})),
+    "csv-nasty": lambda: PathCsv().write(nasty_program()),
+    "gcode-vector": lambda: GCode().write(simple_program()),
+    "gcode-rotary-ac": lambda: GCode({"orientation": "rotary", "line_numbers": 10}).write(simple_program()),
+    "gcode-rotary-bc-inch": lambda: GCode(
+        {"orientation": "rotary", "kinematics": "BC", "units": "inch", "program_number": 12, "work_offset": "G54"}
+    ).write(simple_program()),
+    "gcode-siemens": lambda: GCode({"orientation": "siemens"}).write(simple_program(T_scan_program=POSE)),
+    "gcode-nasty": lambda: GCode().write(nasty_program()),
+    "gcode-siemens-nasty": lambda: GCode({"orientation": "siemens"}).write(nasty_program()),
+    "val3": lambda: Val3().write(simple_program()),
+    "val3-linked": lambda: Val3(LINKED).write(simple_program(T_scan_program=POSE)),
+    "val3-nasty": lambda: Val3().write(nasty_program()),
+}
+POSTS = [PathCsv(), GCode(), GCode({"orientation": "rotary"}), GCode({"orientation": "siemens"}), Val3()]
+EACH_POST = pytest.mark.parametrize("post", POSTS, ids=lambda p: f"{p.name}-{getattr(p.options, 'orientation', '')}")
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_golden_files(case):
+    """Set SICP_REGENERATE_GOLDEN=1 to write them anew, and read the difference before you believe it."""
+    files, folder = CASES[case](), GOLDEN / case
+    if os.environ.get("SICP_REGENERATE_GOLDEN") == "1":
+        shutil.rmtree(folder, ignore_errors=True)
+        for file, content in files.items():
+            (folder / file).parent.mkdir(parents=True, exist_ok=True)
+            (folder / file).write_bytes(content)
+    golden = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    assert sorted(files) == sorted(golden)
+    for file, content in files.items():
+        assert content == golden[file], file
+
+
+@EACH_POST
+def test_same_program_same_bytes_and_nothing_is_changed(post):
+    program = simple_program()
+    before = program.path.tips_mm.copy()
+    assert post.write(program) == type(post)(dataclasses.asdict(post.options)).write(simple_program())
+    assert np.array_equal(before, program.path.tips_mm)
+
+
+@EACH_POST
+def test_nasty_text_changes_no_line_but_its_own(post):
+    nasty = nasty_program()
+    plain_events = tuple(dataclasses.replace(event, text="x") for event in nasty.path.events)
+    plain = dataclasses.replace(
+        nasty, name="x", notes=("x", "x", "x"), path=dataclasses.replace(nasty.path, events=plain_events)
+    )
+    nasty_files, plain_files = post.write(nasty), post.write(plain)
+
+    def statements(files):
+        by_kind = sorted(files.items(), key=lambda item: (item[0].rsplit(".", 1)[1], item[0]))
+        lines = [line for _, content in by_kind for line in content.decode("utf-8-sig").splitlines()]
+        return [x for x in lines if not x.strip().startswith(("(", ";", "//", "<Data file="))]
+
+    assert statements(nasty_files) == statements(plain_files)
+
+
+@EACH_POST
+def test_nasty_text_is_plain_in_every_file(post):
+    for file, content in post.write(nasty_program()).items():
+        text = content.decode("utf-8-sig")
+        assert text.isascii() and "\x1b" not in text and "\x07" not in text
+        assert not {"/../", "\\", ":", "\n"} & set(file)
+        if post.name == "gcode":
+            for line in text.splitlines():
+                body = line.strip("%")
+                assert body.count("(") == body.count(")") <= 1 and "%" not in body
+                assert not line.lower().startswith("(msg")
+
+
+def test_nasty_text_leaves_val3_well_formed():
+    app = load_val3(Val3().write(nasty_program()))
+    assert app.name == "HelloRobotsNext"
+    assert sum("Hello" in line for line in app.code["start"]) == 5
+    assert all(line.startswith("//") for line in app.code["start"] if "Hello" in line)
+
+
+@EACH_POST
+def test_the_changed_name_is_told(post):
+    told = [f for f in post.preflight(nasty_program()) if f.code == 609]
+    assert len(told) == 1 and "\n" not in told[0].message
+
+
+@EACH_POST
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_none_are_refused(post, bad):
+    for program in (
+        straight_program(3, feed=[600, bad, 600]),
+        straight_program(3, events=(Event(1, EventKind.DWELL, bad),)),
+        straight_program(3, events=(Event(1, EventKind.SPINDLE, bad),)),
+        straight_program(3, columns={"u": np.array([0, bad, 0])}),
+    ):
+        with pytest.raises(PathError, match=f"post {post.name} refuses 'porthole': "):
+            post.write(program)
+
+
+@EACH_POST
+@pytest.mark.parametrize(("array", "bad"), [("tips_mm", np.nan), ("tips_mm", 1e22), ("axes", np.nan), ("axes", np.inf)])
+def test_numbers_that_slip_past_the_model_are_refused(post, array, bad):
+    program = straight_program(3)
+    broken = getattr(program.path, array).copy()
+    broken[1] = bad
+    object.__setattr__(program.path, array, broken)
+    with np.errstate(invalid="ignore"), pytest.raises(PathError, match="move 1, line 11"):
+        post.write(program)
+
+
+@EACH_POST
+def test_tiny_numbers_have_no_sign_and_no_exponent(post):
+    axes = [[-1e-9, 1e-12, 1.0], [0.0, -1e-9, 1.0]]
+    program = program_of(path_of([[-0.00004, 1e-9, -0.0], [1e-7, -1e-7, 0.0]], axes, 600.0, [True, False]))
+    for content in post.write(program).values():
+        text = content.decode("utf-8-sig")
+        assert "-0.0000" not in text.replace("-0.00001", "") and "e-" not in text.lower()
+
+
+@EACH_POST
+def test_empty_paths_are_refused(post):
+    with pytest.raises(PathError, match="no moves"):
+        post.write(program_of(path_of(np.zeros((0, 3)), np.zeros((0, 3)))))
+
+
+@EACH_POST
+def test_one_move_is_a_program(post):
+    assert post.write(program_of(path_of([[1, 2, 3]], [[0, 0, 1]], 100.0)))
+
+
+@EACH_POST
+def test_unknown_options_are_job_errors(post):
+    with pytest.raises(JobError, match=f"post {post.name} has no option 'blnd'"):
+        type(post)({"blnd": 1})
+
+
+@pytest.mark.parametrize("post", POSTS[1:], ids=lambda p: f"{p.name}-{getattr(p.options, 'orientation', '')}")
+def test_a_cut_without_feed_is_refused_with_its_line_and_remedy(post):
+    with pytest.raises(PathError, match=r"move 2, line 12: cutting move with feed 0; .*--set path\.feed_mm_min="):
+        post.write(straight_program(4, feed=[0, 600, 0, 600]))
+
+
+@pytest.mark.parametrize("post", POSTS[1:], ids=lambda p: f"{p.name}-{getattr(p.options, 'orientation', '')}")
+def test_words_of_another_dialect_are_told_and_not_written(post):
+    told = [f for f in post.preflight(simple_program()) if f.code == 610]
+    assert len(told) == 1 and "INSERT/X" in told[0].message and told[0].where == "before move 5, line 13"
+    assert not any(b"INSERT" in content for content in post.write(simple_program()).values())
+
+
+def test_the_nasty_text_is_the_one_meant():
+    assert "\n" in NASTY and "]]>" in NASTY

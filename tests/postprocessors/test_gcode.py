@@ -1,0 +1,185 @@
+import numpy as np
+import pytest
+from post_programs import leaning_axes, path_of, program_of, simple_program, straight_program
+from post_reread import axis_error_deg, read_gcode
+
+from sicp_cam.errors import JobError, PathError
+from sicp_cam.findings import Level
+from sicp_cam.model import Event, EventKind
+from sicp_postprocessors.gcode import GCode
+from sicp_postprocessors.rotary import axes_from_angles, axis_errors_deg, head_angles
+
+DIALECTS = [
+    {},
+    {"units": "inch"},
+    {"orientation": "rotary"},
+    {"orientation": "rotary", "kinematics": "BC", "line_numbers": 5},
+    {"orientation": "siemens"},
+    {"orientation": "siemens", "units": "inch", "line_numbers": 10},
+]
+
+
+def text_of(files):
+    (content,) = files.values()
+    return content.decode("ascii")
+
+
+@pytest.mark.parametrize("options", DIALECTS, ids=str)
+def test_program_reads_back(options):
+    program = simple_program()
+    result = read_gcode(GCode(options).write(program), options.get("kinematics", "AC"))
+    assert np.abs(np.array(result.tips) - program.path.tips_mm).max() < 1e-3
+    assert axis_error_deg(np.array(result.axes), program.path.axes) < 1e-3
+    assert np.allclose(result.feeds, program.path.feeds_mm_min, rtol=1e-5)
+    assert result.rapid == program.path.rapid.tolist()
+
+
+def test_events_stand_in_their_place():
+    actions = [a for a in read_gcode(GCode().write(simple_program())).actions if a[0] != "comment" or "first" in a[1]]
+    assert actions == [
+        *[("code", code) for code in ("G21", "G90", "G94", "G17", "G40")],
+        ("code", "G49"),
+        ("tool", 3),
+        ("code", "M6"),
+        ("code", "G435"),
+        ("code", "M3"),
+        ("speed", 12000.0),
+        ("move", 0),
+        ("code", "M8"),
+        ("move", 1),
+        ("comment", "(first side)"),
+        ("move", 2),
+        ("dwell", 1.5),
+        ("move", 3),
+        ("code", "M0"),
+        ("move", 4),
+        ("move", 5),
+        ("code", "M9"),
+        ("code", "M5"),
+        ("code", "G49"),
+        ("code", "M30"),
+    ]
+
+
+def test_what_still_runs_is_switched_off_at_the_end():
+    events = (Event(0, EventKind.SPINDLE, -500.0), Event(0, EventKind.COOLANT, 1.0))
+    lines = text_of(GCode().write(straight_program(2, events=events))).splitlines()
+    assert "S500 M4" in lines
+    assert lines[-5:] == ["M5", "M9", "G49", "M30", "%"]
+
+
+def test_feed_stands_where_it_changes_and_after_rapid_moves():
+    program = straight_program(6, feed=[0, 100, 100, 200, 0, 200], rapid=[True, False, False, False, True, False])
+    lines = [x for x in text_of(GCode().write(program)).splitlines() if x.startswith(("G0", "G1"))]
+    assert [x.split("F")[1] if "F" in x else "" for x in lines] == ["", "100", "", "200", "", "200"]
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({}, "G4 P0.250"),
+        ({"dwell": "X"}, "G4 X0.250"),
+        ({"dwell": "P_MS"}, "G4 P250"),
+        ({"orientation": "siemens"}, "G4 F0.250"),
+    ],
+)
+def test_dwell_words(options, line):
+    text = text_of(GCode(options).write(straight_program(2, events=(Event(1, EventKind.DWELL, 0.25),))))
+    assert line in text.splitlines()
+    assert ("dwell in milliseconds" in text) == (options.get("dwell") == "P_MS")
+
+
+def test_words_of_the_site_replace_those_of_the_dialect():
+    options = {"tcp_on": "M428", "tcp_off": "M429", "orientation": "rotary", "work_offset": "G54", "program_number": 7}
+    lines = text_of(GCode(options).write(straight_program(2))).splitlines()
+    assert lines[:2] == ["%", "O0007"]
+    assert "G54" in lines and "M428" in lines and lines[-3:] == ["M429", "M30", "%"]
+
+
+def test_tool_word_of_the_start():
+    assert "G43.5 H4" in text_of(GCode({"tool": 4}).write(straight_program(2))).splitlines()
+    assert "G43.5" in text_of(GCode().write(straight_program(2))).splitlines()
+
+
+def test_frame_of_the_program_is_told_and_written():
+    pose = np.eye(4)
+    pose[:3, 3] = 1.5, -2.0, 0.25
+    program = simple_program(T_scan_program=pose)
+    (told,) = [f for f in GCode().preflight(program) if f.code == 612]
+    assert told.level is Level.WARN and "work offset" in told.message
+    assert "origin 1.5 -2 0.25 mm, rotation rows 1 0 0 / 0 1 0 / 0 0 1" in text_of(GCode().write(program)).replace(
+        ")\n(", " "
+    )
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"decimals": 2}, {"tcp_on": "G43 (x)"}, {"orientation": "euler"}, {"program_number": 0},
+     {"tilt_limits_deg": "9,1"}, {"orientation": "siemens", "program_number": 1}, {"units": "m"}],
+)  # fmt: skip
+def test_options_out_of_range(options):
+    with pytest.raises(JobError):
+        GCode(options)
+
+
+class TestRotary:
+    def test_known_angles(self):
+        axes = np.array([[0.0, -0.5, np.sqrt(0.75)], [0.5, 0.0, np.sqrt(0.75)]])
+        ac, bc = head_angles(axes, "AC", 0.0), head_angles(axes, "BC", 0.0)
+        assert np.allclose(ac.tilt_deg, 30) and np.allclose(ac.turn_deg, [0, 90])
+        assert np.allclose(bc.tilt_deg, 30) and np.allclose(bc.turn_deg, [-90, 0])
+
+    @pytest.mark.parametrize("kinematics", ["AC", "BC"])
+    def test_forward_of_inverse(self, kinematics):
+        axes = np.random.default_rng(1).normal(size=(2000, 3))
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        angles = head_angles(axes, kinematics, 0.0)
+        assert axis_errors_deg(axes, axes_from_angles(angles.tilt_deg, angles.turn_deg, kinematics)).max() < 1e-9
+
+    def test_turns_run_on_through_half_a_turn(self):
+        angles = head_angles(leaning_axes(200, turn=6 * np.pi), "BC", 1e-3)
+        assert np.abs(np.diff(angles.turn_deg)).max() < 6.0
+        assert np.isclose(angles.turn_deg[-1] - angles.turn_deg[0], 1080.0)
+
+    def test_through_the_pole_the_head_tilts_on_without_turning(self):
+        lean = np.radians(np.linspace(20, -20, 41))
+        axes = np.column_stack([np.sin(lean), np.zeros(41), np.cos(lean)])
+        angles = head_angles(axes, "BC", 1e-3)
+        assert np.allclose(angles.turn_deg, 0.0) and np.allclose(angles.tilt_deg, np.degrees(lean))
+        assert angles.held.sum() == 1
+
+    def test_moves_at_the_pole_take_the_turn_that_follows(self):
+        axes = np.vstack([[[0.0, 0.0, 1.0]] * 3, leaning_axes(2, turn=0.0)])
+        assert np.allclose(head_angles(axes, "AC", 1e-3).turn_deg, 90.0)
+
+    def test_hold_is_told_with_its_error(self):
+        axes = leaning_axes(5, lean=1e-4, turn=3.0)
+        post = GCode({"orientation": "rotary", "singular_cone_deg": 0.01})
+        program = program_of(path_of(np.eye(5)[:, :3], axes, 600.0, [True] + [False] * 4))
+        (told,) = [f for f in post.preflight(program) if f.code == 620]
+        assert told.where == "moves 0 to 4, lines 10 to 14" and "at most 0.00" in told.message
+        result = read_gcode(post.write(program))
+        assert axis_error_deg(np.array(result.axes), axes) <= 0.01
+
+    def test_travel_is_kept(self):
+        post = GCode({"orientation": "rotary", "tilt_limits_deg": "-10,10"})
+        with pytest.raises(PathError, match="moves 0 to 5, lines 10 to 15: A leaves its travel -10 to 10"):
+            post.write(simple_program())
+        turning = GCode({"orientation": "rotary", "turn_limits_deg": "-360,120"})
+        with pytest.raises(PathError, match="C leaves its travel"):
+            turning.write(simple_program())
+
+    def test_a_fast_turn_is_a_warning(self):
+        axes = leaning_axes(4, lean=0.001, turn=3.0)
+        program = program_of(path_of(np.eye(4)[:, :3], axes, 600.0, [True] + [False] * 3))
+        told = [f for f in GCode({"orientation": "rotary"}).preflight(program) if f.code == 622]
+        assert [f.where for f in told] == ["moves 1 to 3, lines 11 to 13"] and told[0].level is Level.WARN
+
+    def test_words_that_miss_the_axis_are_stopped(self, monkeypatch):
+        monkeypatch.setattr("sicp_postprocessors.gcode.head_angles", lambda *a: _off(head_angles(*a)))
+        with pytest.raises(PathError, match="move 0, line 10: the rotary words miss the tool axis"):
+            GCode({"orientation": "rotary"}).write(simple_program())
+
+
+def _off(angles):
+    return type(angles)(angles.tilt_deg + 0.001, angles.turn_deg, angles.held)
