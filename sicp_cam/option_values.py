@@ -122,9 +122,11 @@ def nearest(key: str, known: typing.Iterable[str]) -> str:
     """
     import difflib
 
-    names = sorted(known)
+    names = sorted(printable(name) for name in known)
     close = difflib.get_close_matches(key, names, n=1)
-    return f"did you mean {close[0]}?" if close else f"known: {', '.join(names)}" if names else "none is known here"
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"known: {', '.join(names)}" if names else "none is known here"
 
 
 def _within(value: Any, allowed: Range) -> Any:

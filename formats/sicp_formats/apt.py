@@ -151,7 +151,8 @@ class _Reader:
                 "CIRCLE without the GOTO that ends the arc; is the file complete?", self._circle.line
             )
         self._frames.finish(last_line)
-        self._votes.check(self.moves)
+        if self._arc_sense == "auto":
+            self._votes.check(self.moves)
         if not self._ended:
             self.moves.note(Notice.END_MISSING, last_line)
 

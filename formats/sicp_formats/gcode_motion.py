@@ -192,8 +192,8 @@ class Motion:
             raise GCodeError("zero-radius arc; correct the line")
         if abs(arc.radius_start - arc.radius_end) > _RADIUS_TOLERANCE_MM:
             raise GCodeError(
-                f"radius to end of arc ({arc.radius_end:.4f} mm) differs from radius to start ({arc.radius_start:.4f}); "
-                "correct it"
+                f"radius to end of arc ({arc.radius_end:.4f} mm) differs from radius to start "
+                f"({arc.radius_start:.4f} mm); correct the line"
             )
         self._moves.arc(arc, (axis_before, self.axis), self._feed(arc.length_mm), False, line, "G2, G3")
 

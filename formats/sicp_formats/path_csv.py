@@ -164,8 +164,9 @@ def _read_rows(moves: MoveList, table: _Table, rows: list[tuple[int, str]]) -> N
             hint = "; are there decimal commas?" if table.delimiter == "," else "; complete the row"
             raise moves.error(f"{len(cells)} cells where {table.width} are expected{hint}", line)
         x, y, z = _numbers(moves, cells, table.tip, line)
-        points_seen, commas_seen = points_seen or "." in text, commas_seen or "," in text
-        if points_seen and commas_seen and table.delimiter != ",":
+        coordinates = "".join([cells[column] for column in table.tip])
+        points_seen, commas_seen = points_seen or "." in coordinates, commas_seen or "," in coordinates
+        if points_seen and commas_seen:
             raise moves.error("decimal points and decimal commas in one table; use one of them", line)
         if table.axis is not None:
             i, j, k = _numbers(moves, cells, table.axis, line)

@@ -28,8 +28,8 @@ from sicp_formats.step_skins import Skin, skins
 
 __all__ = ["main"]
 
-GAP_MM = 0.05
-"""Curves that leave their surface, or miss each other, by more than this are worth a warning."""
+GAP_MM, WRONG_MM = 0.05, 0.5
+"""Curves that leave their surface, or miss each other, by the first are worth a warning, by the second are refused."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,6 +125,10 @@ def _edges(part: _SkinOfBody, notes: Notes) -> list[_Edge]:
         at = "({:.1f}, {:.1f}, {:.1f})".format(*sampled.points_mm[0])
         if not sampled.closed:
             notes.add(208, Level.WARN, f"the boundary that starts at {at} does not close; it is an open contour")
+        if not sampled.gap_mm <= WRONG_MM:
+            raise CadError(
+                f"the edge through {at} is {sampled.gap_mm:.3g} mm off its surface or the next edge; export it again"
+            )
         if sampled.gap_mm > GAP_MM:
             notes.add(206, Level.WARN, f"the edge through {at} is off its surface, or open, by {sampled.gap_mm:.3f} mm")
         edges.append(_Edge(sampled, *ring_points(sampled, surface)))

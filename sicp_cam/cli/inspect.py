@@ -85,13 +85,12 @@ def _run(
     return 0
 
 
-def _role(file: Path) -> Role:
+def _role(file: Path) -> str:
     from sicp_cam.plugins import roles
 
     possible = roles(file)
     if len(possible) == 1:
-        only: Any = possible[0]
-        return only  # type: ignore[no-any-return]  # one of the literals
+        return possible[0]
     if not possible:
         raise InputError(f"{printable(str(file))}: nothing reads this suffix; see sicp-cam plugins")
     raise JobError(f"{printable(str(file))}: may be a {' or a '.join(possible)}; say which with --role")

@@ -49,6 +49,8 @@ class EdgeMeasurement:
         (k,) scan surface along N at the scan's edge, and its slope dv/dh there; NaN where the scan shows no surface.
     covered
         (k,) True where the scan shows both.
+    edge_trusted
+        (k,) True where, besides, the window of the edge reaches into no gap: the depth holds there.
     noise_mm
         Standard deviation of single points from the fitted surface.
     """
@@ -58,6 +60,7 @@ class EdgeMeasurement:
     height_mm: FloatArray
     slope: FloatArray
     covered: BoolArray
+    edge_trusted: BoolArray
     noise_mm: float
 
 
@@ -83,7 +86,8 @@ def measure(curve: FramedCurve, surface: ScanSurface, *, reach_mm: float) -> Edg
     height = local.height_mm(at_edge)
     covered = np.isfinite(depth) & np.isfinite(height) & (rim_weight > COVERED_SHARE * np.median(rim_weight))
     covered &= _dense(_only(seen, local.on_surface), at_edge, stations, curve, spacing_mm)
-    return EdgeMeasurement(stations, depth, height, local.slope(at_edge), covered, local.noise_mm)
+    trusted = _away_from_gaps(covered, stations, curve, EDGE_WIDTH_SPACINGS * spacing_mm)
+    return EdgeMeasurement(stations, depth, height, local.slope(at_edge), covered, trusted, local.noise_mm)
 
 
 def _only(seen: CurveCoordinates, rows: BoolArray) -> CurveCoordinates:
@@ -149,6 +153,15 @@ def _dense(
         density = G.sum(axis=1)
         dense &= density > COVERED_SHARE * np.median(density)
     return dense
+
+
+def _away_from_gaps(covered: BoolArray, stations: FloatArray, curve: FramedCurve, distance_mm: float) -> BoolArray:
+    """Return the covered stations further than a distance from every gap; all of them where that leaves too few."""
+    reach = int(np.ceil(distance_mm / (stations[1] - stations[0])))
+    wide = np.pad(~covered, reach, mode="wrap" if curve.closed else "constant")
+    near_gap = np.convolve(wide, np.ones(2 * reach + 1), mode="valid") > 0.5
+    away = covered & ~near_gap
+    return away if away.sum() >= 0.5 * covered.sum() else covered
 
 
 def on_curve(values: FloatArray, measured: EdgeMeasurement, curve: FramedCurve, *, bridge: bool = False) -> FloatArray:

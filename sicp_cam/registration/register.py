@@ -149,7 +149,7 @@ def _stability(contour: NominalContour, divided: Subdivided) -> FloatArray:
 
 
 def _residuals(measured: EdgeMeasurement, curve: FramedCurve) -> Residuals:
-    normal = np.where(measured.covered, measured.depth_mm, np.nan)
+    normal = np.where(measured.edge_trusted, measured.depth_mm, np.nan)
     out = np.where(measured.covered, measured.height_mm, np.nan)
     return Residuals(on_curve(normal, measured, curve), on_curve(out, measured, curve))
 

@@ -42,13 +42,14 @@ class Targets:
         (k,) arc lengths of the stations.
     points_scan_mm
         (k, 3) targets in the scan frame.
-    weights
-        (k,) trust in each; 0 where the scan shows nothing.
+    edge_weights, surface_weights
+        (k,) trust in each, in the surface across the contour and out of it; 0 where the scan shows nothing.
     """
 
     s_mm: FloatArray
     points_scan_mm: FloatArray
-    weights: FloatArray
+    edge_weights: FloatArray
+    surface_weights: FloatArray
 
 
 Correspondence: TypeAlias = Callable[[FramedCurve, IntArray], Rows]
@@ -60,9 +61,11 @@ def point_to_curve(targets: Targets) -> Correspondence:
 
     def rows(now: FramedCurve, stations: IntArray) -> Rows:
         offset = targets.points_scan_mm[stations] - now.points_mm
-        trust = targets.weights[stations]
+        across = np.sum(offset * now.inward, axis=1)
+        out = np.sum(offset * now.outward, axis=1)
         return stacked(
-            *(Rows(now.points_mm, axis, np.sum(offset * axis, axis=1), trust) for axis in (now.inward, now.outward))
+            Rows(now.points_mm, now.inward, across, targets.edge_weights[stations]),
+            Rows(now.points_mm, now.outward, out, targets.surface_weights[stations]),
         )
 
     return rows

@@ -112,7 +112,8 @@ def _targets(curve: FramedCurve, measured: EdgeMeasurement) -> Targets:
     foot = at(curve, measured.s_mm)
     depth, height = np.nan_to_num(measured.depth_mm)[:, None], np.nan_to_num(measured.height_mm)[:, None]
     points = foot.points_mm + depth * foot.inward + height * foot.outward
-    return Targets(measured.s_mm, points, measured.covered.astype(np.float64))
+    trusted, covered = measured.edge_trusted.astype(np.float64), measured.covered.astype(np.float64)
+    return Targets(measured.s_mm, points, trusted, covered)
 
 
 def _registered(
@@ -133,4 +134,4 @@ def _mean_out(curve: FramedCurve, targets: Targets) -> float:
     """Return the mean distance of the targets from the curve, out of the surface."""
     foot = at(curve, targets.s_mm)
     out = np.sum((targets.points_scan_mm - foot.points_mm) * foot.outward, axis=1)
-    return float(np.average(np.abs(out), weights=targets.weights)) if targets.weights.any() else np.inf
+    return float(np.average(np.abs(out), weights=targets.surface_weights)) if targets.surface_weights.any() else np.inf

@@ -17,8 +17,9 @@ from sicp_cam.report import result_tables
 from sicp_cam.report.deviation import out_of_surface
 from sicp_cam.report.document import Picture, ReportDocument
 from sicp_cam.report.figures import correction_along_contour, error_along_contour
+from sicp_cam.report.path_view import largest_correction, paths_scene
 from sicp_cam.report.scenes import Scene, render
-from sicp_cam.report.views import deviation_scene, largest_correction, paths_scene, subdivision_scene
+from sicp_cam.report.views import deviation_scene, sample, subdivision_scene
 from sicp_cam.rigid_motion import apply, rotate
 
 __all__ = ["PICTURES_FAILED", "SCHEMA", "document", "pictures"]
@@ -158,7 +159,9 @@ def _scenes(
     normals = None if part_mesh.normals is None else rotate(registration.T_scan_part, part_mesh.normals)
     mesh = TriangleMesh(apply(registration.T_scan_part, part_mesh.vertices_mm), part_mesh.faces, normals)
     points, deviation = _deviations(mesh, scan, registration)
-    scenes = {"deviation.png": deviation_scene(mesh, points, deviation, registration, tolerance_mm)}
+    scenes = {
+        "deviation.png": deviation_scene(mesh, points, deviation, registration, tolerance_mm, len(scan.points_mm))
+    }
     for contour in registration.contours:
         scenes[f"subdivision_{contour.number}.png"] = subdivision_scene(contour, registration)
     if path_rigid is not None and path_corrected is not None:
@@ -179,9 +182,12 @@ def _exaggeration(path_rigid: ToolPath, path_corrected: ToolPath) -> float:
 
 
 def _deviations(mesh: TriangleMesh, scan: Scan, registration: Registration) -> tuple[FloatArray, FloatArray]:
-    """Return the scan points near the contours and how far they lie out of the outer skin."""
+    """Return scan points near the contours, as many as a picture can show, and their distances out of the outer skin."""
     stations = np.concatenate([contour.rigid.points_mm for contour in registration.contours])
     outward = np.concatenate([contour.rigid.outward for contour in registration.contours])
-    distance, _ = cKDTree(stations).query(scan.points_mm, distance_upper_bound=_REACH_MM)
-    points = scan.points_mm[np.isfinite(distance)]
+    low, high = stations.min(axis=0) - _REACH_MM, stations.max(axis=0) + _REACH_MM
+    points = scan.points_mm[np.all((scan.points_mm >= low) & (scan.points_mm <= high), axis=1)]
+    points = points[sample(len(points))]
+    distance, _ = cKDTree(stations).query(points, distance_upper_bound=_REACH_MM)
+    points = points[np.isfinite(distance)]
     return points, out_of_surface(points, mesh, stations, outward)

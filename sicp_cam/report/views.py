@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from sicp_cam.contour.frames import FramedCurve, at
-from sicp_cam.model import BoolArray, FloatArray, IntArray, ToolPath, TriangleMesh
+from sicp_cam.model import FloatArray, IntArray, TriangleMesh
 from sicp_cam.registration.result import RegisteredContour, Registration
 from sicp_cam.report.camera import Camera, looking_at, pixels
 from sicp_cam.report.deviation_colours import deviation_bar, deviation_colours
 from sicp_cam.report.lettering import Key, Label, Lettering
-from sicp_cam.report.scenes import Arrows, Dots, Layer, Line, Scene, Surface
+from sicp_cam.report.scenes import Dots, Layer, Line, Scene, Surface
 from sicp_cam.report.stretches import covered_twice, marked
 
-__all__ = ["deviation_scene", "largest_correction", "loops_scene", "paths_scene", "subdivision_scene"]
+__all__ = ["PART", "SHOWN_POINTS", "camera_on", "deviation_scene", "loops_scene", "sample", "subdivision_scene"]
 
-PART, RIGID, CORRECTED, RAPID, GAP = "#d4d4d4", "#d0761f", "#1f4fa3", "#8f8f8f", "#e8a0a8"
+PART, GAP = "#d4d4d4", "#e8a0a8"
 _PIECES = ("#1f6fb4", "#e08a1e", "#2f9e62")
-_SHOWN_POINTS = 150_000
-_SHOWN_ARROWS = 44
+SHOWN_POINTS = 150_000
 
 
 def deviation_scene(
@@ -31,6 +29,7 @@ def deviation_scene(
     deviation_mm: FloatArray,
     registration: Registration,
     tolerance_mm: float,
+    scan_points: int,
 ) -> Scene:
     """Return the picture of the rigidly registered part with the scan points on it, coloured by their deviation.
 
@@ -43,12 +42,13 @@ def deviation_scene(
         no surface under a point.
     tolerance_mm
         Points within it share one neutral colour.
+    scan_points
+        How many points the whole scan has.
     """
     curves = [contour.rigid for contour in registration.contours]
-    shown = _sample(len(points_scan_mm))
-    points, deviation = points_scan_mm[shown], deviation_mm[shown]
-    seen = np.concatenate([*(curve.points_mm for curve in curves), *([points] if len(points) else [])])
-    camera = _camera(seen, curves, registration, tilt_deg=20.0)
+    points, deviation = points_scan_mm, deviation_mm
+    seen = np.concatenate([*(curve.points_mm for curve in curves), points])
+    camera = camera_on(seen, registration, tilt_deg=20.0)
     known = np.isfinite(deviation)
     bar = deviation_bar(deviation_mm, tolerance_mm)
     lift = float(np.nanmax(np.abs(deviation[known]), initial=0.0)) + 5.0
@@ -58,12 +58,12 @@ def deviation_scene(
         Surface(mesh_scan_frame, PART),
         Dots(points[~known], grey, 2.0, lift),
         Dots(points[known], deviation_colours(deviation[known], bar), size, lift),
-        *(_loop(curve, "#1a1a1a", 2.5, lift + 1.0) for curve in curves),
+        *(_loop(curve, "#1a1a1a", 2.5, 2.0 * lift) for curve in curves),
     ]
     keys = [Key("nominal contour, rigidly registered", "#1a1a1a")]
     if not known.all():
         keys.append(Key("scan point with no nominal surface under it", "#5a5a5a", "."))
-    few = f"; {len(points):,} of {len(points_scan_mm):,} points drawn" if len(points) < len(points_scan_mm) else ""
+    few = f"; {len(points):,} of the scan's {scan_points:,} points drawn" if len(points) < scan_points else ""
     words = Lettering(
         "Scan against the rigidly registered part",
         f"positive: the scan lies outside of the nominal surface; within ±{tolerance_mm:g} mm: one colour{few}",
@@ -104,60 +104,6 @@ def subdivision_scene(contour: RegisteredContour, registration: Registration) ->
     return Scene(tuple(layers), camera, words)
 
 
-def paths_scene(
-    mesh_scan_frame: TriangleMesh,
-    path_rigid: ToolPath,
-    path_corrected: ToolPath,
-    registration: Registration,
-    exaggeration: float = 1.0,
-) -> Scene:
-    """Return the picture of the nominal (rigidly registered) and the corrected path with tool axes (figure 11).
-
-    Parameters
-    ----------
-    exaggeration
-        How many times larger than it is the correction is drawn, which the title then says; other than 1 only for
-        paths that correspond move by move. Axes are never exaggerated.
-    """
-    curves = [contour.rigid for contour in registration.contours]
-    tips = path_corrected.tips_mm
-    if exaggeration != 1.0:
-        tips = path_rigid.tips_mm + exaggeration * (tips - path_rigid.tips_mm)
-    drawn = ((path_rigid, path_rigid.tips_mm, RIGID, 2.5), (path_corrected, tips, CORRECTED, 3.5))
-    seen = np.concatenate([*(places[~path.rapid] for path, places, _, _ in drawn), *(c.points_mm for c in curves)])
-    length = 0.07 * float(np.linalg.norm(np.ptp(seen, axis=0)))
-    heads = [(places + length * path.axes)[~path.rapid] for path, places, _, _ in drawn]
-    camera = _camera(np.concatenate([seen, *heads]), curves, registration, tilt_deg=50.0)
-    lift = camera.mm_per_px * 6 + exaggeration * min(largest_correction(path_rigid, path_corrected), length)
-    layers: list[Layer] = [Surface(mesh_scan_frame, PART)]
-    for path, places, colour, width in drawn:
-        for rapid, run in _runs(places, path.rapid):
-            layers.append(Line(_thinned(run, camera), RAPID if rapid else colour, 1.5 if rapid else width, lift))
-        cut = np.flatnonzero(~path.rapid)
-        chosen = cut[np.unique(np.linspace(0, len(cut) - 1, min(_SHOWN_ARROWS, len(cut))).astype(np.int64))]
-        layers.append(Arrows(places[chosen], path.axes[chosen], length, colour, lift))
-        lift += camera.mm_per_px * 4
-    keys = [Key("nominal path, rigidly registered", RIGID), Key("corrected path", CORRECTED)]
-    if path_rigid.rapid.any() or path_corrected.rapid.any():
-        keys.append(Key("rapid moves", RAPID))
-    larger = "" if exaggeration == 1.0 else f", correction drawn {exaggeration:g} times larger"
-    scale = "true to scale" if exaggeration == 1.0 else "positions of the corrected path are NOT true to scale"
-    words = Lettering(
-        f"Nominal and corrected path{larger}",
-        f"{scale}; arrows: tool axis from tip to holder, {_SHOWN_ARROWS} of each path at most",
-        tuple(keys),
-    )
-    return Scene(tuple(layers), camera, words)
-
-
-def largest_correction(path_rigid: ToolPath, path_corrected: ToolPath) -> float:
-    """Return the largest distance between corresponding cutting moves, mm; 0 if the paths do not correspond."""
-    if len(path_rigid) != len(path_corrected):
-        return 0.0
-    shift = np.linalg.norm(path_corrected.tips_mm - path_rigid.tips_mm, axis=1)
-    return float(np.max(shift[~path_rigid.rapid], initial=0.0))
-
-
 def loops_scene(
     points_mm: FloatArray,
     faces: IntArray | None,
@@ -190,7 +136,7 @@ def loops_scene(
     lift = 0.002 * camera.mm_per_px * camera.width_px
     layers: list[Layer] = []
     if faces is None:
-        shown = points_mm[_sample(len(points_mm))]
+        shown = points_mm[sample(len(points_mm))]
         layers.append(Dots(shown, _one_colour(shown, (165, 170, 178)), 2.0))
     else:
         layers.append(Surface(TriangleMesh(points_mm, faces), PART))
@@ -200,13 +146,15 @@ def loops_scene(
         colour = _PIECES[index % len(_PIECES)]
         layers.append(Line(np.concatenate([loop, loop[:1]]) if ring else loop, colour, 4.0, lift))
         labels.append(Label(str(number), _extremes(loop, camera), colour))
-    hidden = faces is None and len(points_mm) > _SHOWN_POINTS
-    few = f"; {_SHOWN_POINTS:,} of {len(points_mm):,} points drawn" if hidden else ""
+    hidden = faces is None and len(points_mm) > SHOWN_POINTS
+    few = f"; {SHOWN_POINTS:,} of {len(points_mm):,} points drawn" if hidden else ""
     count = f"{len(loops_mm)} loop{'' if len(loops_mm) == 1 else 's'}"
     return Scene(tuple(layers), camera, Lettering(title, count + few, labels=tuple(labels)))
 
 
-def _camera(points: FloatArray, curves: Sequence[FramedCurve], registration: Registration, tilt_deg: float) -> Camera:
+def camera_on(points: FloatArray, registration: Registration, tilt_deg: float) -> Camera:
+    """Return the camera that looks on the outer side of the registered contours with all (n, 3) points in view."""
+    curves = [contour.rigid for contour in registration.contours]
     outward = np.concatenate([curve.outward for curve in curves]).mean(axis=0)
     if np.linalg.norm(outward) < 0.1:  # contours all round a body: the mean says nothing
         outward = _across(np.concatenate([curve.points_mm for curve in curves]))
@@ -221,10 +169,11 @@ def _across(points: FloatArray) -> FloatArray:
     return normal if normal[np.argmax(np.abs(normal))] > 0 else -normal
 
 
-def _sample(count: int) -> IntArray:
-    if count <= _SHOWN_POINTS:
+def sample(count: int) -> IntArray:
+    """Return the indices of at most `SHOWN_POINTS` of so many points, spread evenly and always the same."""
+    if count <= SHOWN_POINTS:
         return np.arange(count)
-    return np.sort(np.random.default_rng(0).choice(count, _SHOWN_POINTS, replace=False))
+    return np.sort(np.random.default_rng(0).choice(count, SHOWN_POINTS, replace=False))
 
 
 def _one_colour(points: FloatArray, rgb: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
@@ -262,24 +211,6 @@ def _pieces(contour: RegisteredContour, lift_mm: float) -> Iterable[Line]:
 def _overlaps(contour: RegisteredContour) -> list[tuple[float, float]]:
     curve = contour.corrected
     return marked(curve, covered_twice(contour.segments, curve, curve.s_mm)) if len(contour.segments) > 1 else []
-
-
-def _runs(tips: FloatArray, rapid: BoolArray) -> Iterable[tuple[bool, FloatArray]]:
-    """Yield the path in pieces of rapid and of cutting moves, each from where the piece before it ended."""
-    borders = [0, *(np.flatnonzero(rapid[1:] != rapid[:-1]) + 1).tolist(), len(tips)]
-    for start, end in pairwise(borders):
-        if end > start:
-            yield bool(rapid[start]), tips[max(start - 1, 0) : end]
-
-
-def _thinned(tips: FloatArray, camera: Camera) -> FloatArray:
-    """Leave out points that fall on the pixel of the point before them."""
-    cell = np.round(pixels(camera, tips) * 2.0)
-    moved = np.any(np.diff(cell, axis=0) != 0, axis=1)
-    kept = np.ones(len(tips), np.bool_)
-    kept[1:-1] = moved[:-1]
-    thin: FloatArray = tips[kept]
-    return thin
 
 
 def _extremes(loop: FloatArray, camera: Camera) -> FloatArray:
