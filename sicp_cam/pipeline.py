@@ -270,17 +270,19 @@ def _start(job: Job) -> tuple[FloatArray | None, tuple[Finding, ...]]:
 
 
 def _read(job: Job) -> Inputs:
-    """Read the three inputs; the CAD kernel works in its own process meanwhile."""
-    path_options = {"feed_mm_min": job.toolpath.feed_mm_min} if job.toolpath.feed_mm_min is not None else {}
+    """Read the three inputs; scan and path are read while the CAD kernel works in its own process.
+
+    This thread waits for the CAD kernel, so that an interrupt reaches it and ends the child.
+    """
+    feed = {} if job.toolpath.feed_mm_min is None else {"feed_mm_min": job.toolpath.feed_mm_min}
+    path_options = {**feed, **job.path_options}
     with ThreadPoolExecutor(1) as beside:
-        part = beside.submit(
-            plugins.read_part, job.cad, units=job.cad_units, limits=job.limits, options=job.part_options
+        scan = beside.submit(
+            plugins.read_scan, job.scan, units=job.scan_units, limits=job.limits, options=job.scan_options
         )
-        scan = plugins.read_scan(job.scan, units=job.scan_units, limits=job.limits, options=job.scan_options)
-        path = plugins.read_path(
-            job.path, units=job.path_units, limits=job.limits, options={**path_options, **job.path_options}
-        )
-        return Inputs(part.result(), scan, path)
+        path = beside.submit(plugins.read_path, job.path, units=job.path_units, limits=job.limits, options=path_options)
+        part = plugins.read_part(job.cad, units=job.cad_units, limits=job.limits, options=job.part_options)
+        return Inputs(part, scan.result(), path.result())
 
 
 def _refuse(gates: tuple[Gate, ...], error: type[RegistrationError] | type[PathError]) -> None:

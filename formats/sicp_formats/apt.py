@@ -12,13 +12,13 @@ from pathlib import Path
 from sicp_cam.errors import JobError, printable
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import EventKind, ToolPath
-from sicp_formats.apt_arcs import ARC_SENSES, Circle, SenseVotes, arc_to, circle_from_line, circle_statement, goes_on
+from sicp_formats.apt_arcs import ARC_SENSES, ArcReader
 from sicp_formats.apt_arguments import NUMBER, split_arguments
 from sicp_formats.apt_frames import FRAME_CHOICES, Frames
 from sicp_formats.apt_machine import Machine
 from sicp_formats.apt_refusals import HARMLESS, reason_to_refuse
 from sicp_formats.apt_statements import COMMENT, TEXT_WORDS, statements
-from sicp_formats.arcs import Arc, Vector, minus, unit
+from sicp_formats.arcs import Vector
 from sicp_formats.moves import MoveList, check_options
 from sicp_formats.path_findings import Notice
 from sicp_formats.program_text import program_lines
@@ -95,18 +95,13 @@ class _Reader:
     def __init__(self, moves: MoveList, frame: str, arc_sense: str) -> None:
         self.moves = moves
         self.name = ""
-        self._arc_sense = arc_sense
         self._machine = machine = Machine(moves)
-        self._votes = SenseVotes()
         self._frames = frames = Frames(moves, frame)
         self._axis: Vector = (0.0, 0.0, 1.0)
         self._axis_stated = False
         self._rapid = False
         self._home: Vector | None = None
-        self._circle: Circle | None = None
-        self._last_arc: tuple[Circle, Arc] | None = None
-        self._arc_line = 0
-        self._direction: Vector | None = None
+        self._arcs = arcs = ArcReader(moves, arc_sense)
         self._ended = False
         self._statements = {
             "GOTO": self._goto,
@@ -115,8 +110,8 @@ class _Reader:
             "GOHOME": self._gohome,
             "RAPID": self._set_rapid,
             "TLAXIS": self._tool_axis,
-            "CIRCLE": self._set_circle,
-            "INDIRV": self._set_direction,
+            "CIRCLE": arcs.circle,
+            "INDIRV": arcs.direction,
             "TLON,GOFWD": self._along_circle,
             "UNITS": self._unit,
             "UNIT": self._unit,
@@ -146,13 +141,8 @@ class _Reader:
         self._finish(len(lines))
 
     def _finish(self, last_line: int) -> None:
-        if self._circle is not None:
-            raise self.moves.error(
-                "CIRCLE without the GOTO that ends the arc; is the file complete?", self._circle.line
-            )
         self._frames.finish(last_line)
-        if self._arc_sense == "auto":
-            self._votes.check(self.moves)
+        self._arcs.finish()
         if not self._ended:
             self.moves.note(Notice.END_MISSING, last_line)
 
@@ -160,11 +150,14 @@ class _Reader:
 
     def _goto(self, line: int, arguments: str) -> None:
         tip = self._point(line, arguments, "GOTO")
-        if self._circle is None and self._last_arc is None:
+        if self._arcs.idle:
             self.moves.rows.extend((*tip, *self._axis, self._machine.feed_mm_min, self._rapid, line))
             self._rapid = False
+        elif self._arcs.circle_waits:
+            self._follow(tip, line)
         else:
-            self._goto_beside_arc(tip, line)
+            self._arcs.leave(tip, line, rapid=self._rapid)
+            self._move(tip, line)
 
     def _point(self, line: int, arguments: str, word: str) -> Vector:
         match = _POINT.fullmatch(arguments)
@@ -189,36 +182,13 @@ class _Reader:
         self.moves.move(tip, self._axis, 0.0 if self._rapid else self._machine.feed_mm_min, self._rapid, line)
         self._rapid = False
 
-    def _goto_beside_arc(self, tip: Vector, line: int) -> None:
-        circle, last = self._circle, self._last_arc
-        start = self.moves.position()
-        self._last_arc = None
-        if circle is not None:
-            self._follow(circle, tip, line)
-            return
-        if last is not None and start is not None and not self._rapid:
-            if goes_on(*last, tip):
-                raise self.moves.error(
-                    "the point after the arc lies on the same circle: straight, or further along the arc? "
-                    "Output one point for each arc, or points only",
-                    line,
-                )
-            self._votes.compare(last[1].end_direction, minus(tip, start), line)
-        self._move(tip, line)
-
-    def _follow(self, circle: Circle, tip: Vector, line: int) -> None:
-        rows, start = self.moves.rows, self.moves.position()
-        arc = arc_to(self.moves, circle, start, tip, line)
-        arrived = len(self.moves) >= 2 and not rows[-2] and rows[-1] != self._arc_line
-        if arrived and not self._rapid and circle.sense != "INDIRV":
-            x, y, z = rows[-18:-15]
-            self._votes.compare(arc.v, minus((rows[-9], rows[-8], rows[-7]), (x, y, z)), circle.line)
-        i, j, k = rows[-6:-3]
+    def _follow(self, tip: Vector, line: int) -> None:
         feed = 0.0 if self._rapid else self._machine.feed_mm_min
-        self.moves.arc(arc, ((i, j, k), self._axis), feed, self._rapid, line, circle.sense)
-        self._last_arc = None if circle.sense == "INDIRV" or self._rapid else (circle, arc)
-        self._arc_line = line
-        self._circle, self._rapid = None, False
+        self._arcs.follow(tip, self._axis, feed, self._rapid, line)
+        self._rapid = False
+
+    def _along_circle(self, line: int, arguments: str) -> None:
+        self._follow(self._arcs.along(line, arguments), line)
 
     def _from(self, line: int, arguments: str) -> None:
         tip = self._point(line, arguments, "FROM")
@@ -233,7 +203,7 @@ class _Reader:
         home = self._point(line, arguments, "GOHOME") if arguments.strip() else self._home
         if home is None:
             raise self.moves.error("GOHOME without a point, and no FROM before it; state the point", line)
-        self._straight(home, line, "GOHOME")
+        self._straight(home, line)
 
     def _godlta(self, line: int, arguments: str) -> None:
         numbers, words = split_arguments(arguments)
@@ -242,12 +212,10 @@ class _Reader:
             raise self.moves.error("GODLTA needs dx,dy,dz and a position before it; correct the line", line)
         mm = self.moves.mm
         dx, dy, dz = numbers
-        self._straight((start[0] + dx * mm, start[1] + dy * mm, start[2] + dz * mm), line, "GODLTA")
+        self._straight((start[0] + dx * mm, start[1] + dy * mm, start[2] + dz * mm), line)
 
-    def _straight(self, tip: Vector, line: int, word: str) -> None:
-        if self._circle is not None:
-            raise self.moves.error(f"CIRCLE must be followed by GOTO, not by {word} (line {line})", self._circle.line)
-        self._last_arc = None
+    def _straight(self, tip: Vector, line: int) -> None:
+        self._arcs.leave(None, line, rapid=self._rapid)
         self._move(tip, line)
 
     def _set_rapid(self, line: int, arguments: str) -> None:
@@ -260,26 +228,6 @@ class _Reader:
         if len(numbers) != 3 or words:
             raise self.moves.error("TLAXIS needs i,j,k; correct the line", line)
         self._turn_axis((numbers[0], numbers[1], numbers[2]), line)
-
-    def _set_circle(self, line: int, arguments: str) -> None:
-        if self._circle is not None:
-            raise self.moves.error("CIRCLE without the GOTO that ends the arc; is a line missing?", self._circle.line)
-        self._circle = circle_statement(self.moves, *split_arguments(arguments), line, self._arc_sense)
-
-    def _set_direction(self, line: int, arguments: str) -> None:
-        numbers, words = split_arguments(arguments)
-        direction = unit((numbers[0], numbers[1], numbers[2])) if len(numbers) == 3 and not words else None
-        if direction is None:
-            raise self.moves.error("INDIRV needs the three numbers of a direction; correct the line", line)
-        self._direction = direction
-
-    def _along_circle(self, line: int, arguments: str) -> None:
-        start = self.moves.position()
-        if self._direction is None or start is None or self._circle is not None:
-            raise self.moves.error("TLON,GOFWD needs a position and INDIRV before it; output arcs as points", line)
-        circle, end = circle_from_line(self.moves, arguments, start, self._direction, line)
-        self._direction, self._last_arc = None, None
-        self._follow(circle, end, line)
 
     def _unit(self, line: int, arguments: str) -> None:
         unit_name = _UNITS.get(arguments.strip().upper())

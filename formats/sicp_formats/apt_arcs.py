@@ -14,11 +14,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from sicp_formats.apt_arguments import NUMBER
+from sicp_formats.apt_arguments import NUMBER, split_arguments
 from sicp_formats.arcs import Arc, Vector, arc_between, cross, dot, minus, norm, unit
 from sicp_formats.moves import MoveList
 
-__all__ = ["ARC_SENSES", "Circle", "SenseVotes", "arc_to", "circle_from_line", "circle_statement", "goes_on"]
+__all__ = ["ARC_SENSES", "ArcReader", "Circle", "arc_to", "circle_from_line", "circle_statement", "goes_on"]
 
 ARC_SENSES = ("auto", "ccw", "cw")
 
@@ -130,7 +130,7 @@ def goes_on(circle: Circle, arc: Arc, tip: Vector) -> bool:
 
 
 @dataclass(slots=True)
-class SenseVotes:
+class _SenseVotes:
     """Do arcs leave the way the tool arrives? A file whose arcs mostly run backwards was read in the wrong sense."""
 
     for_it: int = 0
@@ -155,3 +155,91 @@ class SenseVotes:
                 "State their sense with --set path.arc_sense=ccw or cw (about the stated axis)"
             )
             raise moves.error(what, self.first_against)
+
+
+class ArcReader:
+    """Executes the arc statements of one file: waits for the end of each arc, and watches how the arcs join.
+
+    `idle` is True while a straight move needs no look at arcs.
+    """
+
+    __slots__ = ("_arc_line", "_circle", "_direction", "_last", "_moves", "_sense", "_votes", "idle")
+
+    def __init__(self, moves: MoveList, sense: str) -> None:
+        self.idle = True
+        self._moves = moves
+        self._sense = sense
+        self._votes = _SenseVotes()
+        self._circle: Circle | None = None
+        self._direction: Vector | None = None
+        self._last: tuple[Circle, Arc] | None = None
+        self._arc_line = 0
+
+    @property
+    def circle_waits(self) -> bool:
+        """True if the next GOTO ends an arc."""
+        return self._circle is not None
+
+    def circle(self, line: int, arguments: str) -> None:
+        """CIRCLE/...: the next GOTO ends the arc."""
+        self._refuse_waiting()
+        self._circle = circle_statement(self._moves, *split_arguments(arguments), line, self._sense)
+        self.idle = False
+
+    def direction(self, line: int, arguments: str) -> None:
+        """INDIRV/i,j,k: the way in which the next TLON,GOFWD leaves."""
+        numbers, words = split_arguments(arguments)
+        direction = unit((numbers[0], numbers[1], numbers[2])) if len(numbers) == 3 and not words else None
+        if direction is None:
+            raise self._moves.error("INDIRV needs the three numbers of a direction; correct the line", line)
+        self._direction = direction
+
+    def along(self, line: int, arguments: str) -> Vector:
+        """TLON,GOFWD/(CIRCLE/...),ON,(LINE/...): make its arc wait; return the end point."""
+        self._refuse_waiting()
+        start = self._moves.position()
+        if self._direction is None or start is None:
+            raise self._moves.error("TLON,GOFWD needs a position and INDIRV before it; output arcs as points", line)
+        self._circle, end = circle_from_line(self._moves, arguments, start, self._direction, line)
+        self._direction = None
+        return end
+
+    def follow(self, tip: Vector, axis: Vector, feed: float, rapid: bool, line: int) -> None:
+        """Append the arc that waits, up to its end point."""
+        circle, moves, rows = self._circle, self._moves, self._moves.rows
+        if circle is None:
+            raise self._moves.error("the end of an arc without its circle; output arcs as points", line)
+        arc = arc_to(moves, circle, moves.position(), tip, line)
+        votes = circle.sense != "INDIRV" and not rapid
+        if votes and len(moves) >= 2 and not rows[-2] and rows[-1] != self._arc_line:
+            x, y, z = rows[-18:-15]
+            self._votes.compare(arc.v, (rows[-9] - x, rows[-8] - y, rows[-7] - z), circle.line)
+        i, j, k = rows[-6:-3]
+        moves.arc(arc, ((i, j, k), axis), feed, rapid, line, circle.sense)
+        self._last = (circle, arc) if votes else None
+        self._arc_line, self._circle, self.idle = line, None, self._last is None
+
+    def leave(self, tip: Vector | None, line: int, *, rapid: bool) -> None:
+        """Look at a straight move (None: one that is not compared) before it is appended."""
+        self._refuse_waiting()
+        last, start = self._last, self._moves.position()
+        self._last, self.idle = None, True
+        if last is None or start is None or tip is None or rapid:
+            return
+        if goes_on(*last, tip):
+            raise self._moves.error(
+                "the point after the arc lies on the same circle: straight, or further along the arc? "
+                "Output one point for each arc, or points only",
+                line,
+            )
+        self._votes.compare(last[1].end_direction, minus(tip, start), line)
+
+    def finish(self) -> None:
+        """Refuse an arc without end, and arcs whose sense is in doubt unless the user stated it."""
+        self._refuse_waiting()
+        if self._sense == "auto":
+            self._votes.check(self._moves)
+
+    def _refuse_waiting(self) -> None:
+        if self._circle is not None:
+            raise self._moves.error("CIRCLE without the GOTO that ends the arc; is a line missing?", self._circle.line)

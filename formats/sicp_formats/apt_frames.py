@@ -25,8 +25,8 @@ def pose_from_axes(numbers: list[float]) -> FloatArray | None:
 
     None if these are not nine numbers or the axes are not two perpendicular unit vectors.
 
-    >>> pose_from_axes([1, 2, 3, 0, 1, 0, -1, 0, 0])[:3].tolist()
-    [[0.0, -1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 3.0]]
+    >>> pose_from_axes([1, 2, 3, 0, 1, 0, -1, 0, 0])[:3].astype(int).tolist()
+    [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3]]
     """
     if len(numbers) != 9 or not _moderate(numbers):
         return None

@@ -128,7 +128,7 @@ def arc_between(start: Vector, end: Vector, centre: Vector, normal: Vector) -> A
 
     >>> arc = arc_between((10.0, 0.0, 0.0), (0.0, 10.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     >>> round(arc.length_mm, 3), arc.steps(0.005, 2.0)
-    (15.708, 13)
+    (15.708, 25)
     """
     from_start, from_end = minus(start, centre), minus(end, centre)
     height_start, height_end = dot(from_start, normal), dot(from_end, normal)

@@ -64,6 +64,8 @@ def split_block(line: str) -> Block:
         block.comments.append(message[1] or "")
         line = line[: message.start()] + line[message.end() :]
     code = _RADIUS_WORD.sub("R", _without_comments(line, block).upper())
+    if any(mark in code for mark in "#[<"):
+        raise GCodeError("variables and expressions are not evaluated; post the path with plain numbers")
     code = _KEYWORD.sub(lambda found: _keyword(found[0], block), code)
     for letter, number in FIND_WORDS(code):
         _add_word(block, letter, number)
@@ -102,8 +104,6 @@ def _keyword(text: str, block: Block) -> str:
 
 
 def _add_word(block: Block, letter: str, number: str) -> None:
-    if letter in "#[<":
-        raise GCodeError("variables and expressions are not evaluated; post the path with plain numbers")
     if not letter[0].isalpha():
         raise GCodeError(f"bad character {letter!r} used; correct the line")
     if letter[-1] == "=":

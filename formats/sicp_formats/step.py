@@ -35,7 +35,8 @@ _OTHERS = (
     (re.compile(rb"ISO-10303-28|<\?xml"), "an XML file"),
 )
 # No double holds these; the kernel turns them into something else, or never ends.
-_OVERFLOW = re.compile(rb"[(,]\s*([+-]?\d+\.\d*E\+?0*(?:\d{4,}|[4-9]\d\d|3[1-9]\d|309))\s*[,)]", re.IGNORECASE)
+_OVERFLOW = re.compile(rb"[(,]\s*([+-]?\d+\.\d*E\+?0{0,9}(?:309|3[1-9]\d|[4-9]\d\d|[1-9]\d{3,}))\s*[,)]", re.IGNORECASE)
+_COMMENT = re.compile(rb"/\*.{0,65536}?\*/", re.DOTALL)
 
 
 def read_part(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_LIMITS) -> Part:
@@ -68,7 +69,7 @@ def read_part(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
     if units is not None:
         mm_per_unit(units)
     content = read_bytes(path, limits)
-    _refuse(path, content)
+    _refuse(path, content, limits)
     request = {"units": units, "coordinate_mm": limits.coordinate_mm}
     try:
         result = child_process.run(
@@ -92,9 +93,9 @@ def _name(path: Path) -> str:
     return printable(str(path))
 
 
-def _refuse(path: Path, content: bytes) -> None:
+def _refuse(path: Path, content: bytes, limits: Limits) -> None:
     """Raise for bytes that are no whole STEP file."""
-    if not _START.match(content):
+    if not _START.match(content[: limits.line_bytes]):
         kind = next((what for pattern, what in _OTHERS if pattern.match(content[:200])), "no STEP file")
         raise FormatError(path, f"is {kind} (ISO-10303-21 is not its first word); export the part as STEP", byte=0)
     if content.rfind(_END) < 0:
@@ -107,6 +108,21 @@ def _refuse(path: Path, content: bytes) -> None:
         raise FormatError(
             path, f"holds the number {number}, too large for any computer; export it again", byte=overflow.start(1)
         )
+    literal = _long_literal(content, limits.line_bytes)
+    if literal is not None:
+        raise FormatError(
+            path, f"has a text of more than line_bytes = {limits.line_bytes} bytes; export it again", byte=literal
+        )
+
+
+def _long_literal(content: bytes, longest: int) -> int | None:
+    """Return where a text between quotes is longer than allowed; quotes within comments do not count."""
+    if b"/*" in content:
+        content = _COMMENT.sub(lambda comment: b" " * len(comment[0]), content)
+    quotes = np.flatnonzero(np.frombuffer(content, dtype=np.uint8) == ord("'"))
+    pairs = quotes[: len(quotes) // 2 * 2].reshape(-1, 2)
+    long = pairs[pairs[:, 1] - pairs[:, 0] > longest + 1]
+    return int(long[0, 0]) if len(long) else None
 
 
 def _part(path: Path, content: bytes, result: child_process.ChildResult) -> Part:

@@ -182,7 +182,7 @@ def _exaggeration(path_rigid: ToolPath, path_corrected: ToolPath) -> float:
 
 
 def _deviations(mesh: TriangleMesh, scan: Scan, registration: Registration) -> tuple[FloatArray, FloatArray]:
-    """Return scan points near the contours, as many as a picture can show, and their distances out of the outer skin."""
+    """Return scan points near the contours, as many as a picture shows, and how far out of the outer skin they lie."""
     stations = np.concatenate([contour.rigid.points_mm for contour in registration.contours])
     outward = np.concatenate([contour.rigid.outward for contour in registration.contours])
     low, high = stations.min(axis=0) - _REACH_MM, stations.max(axis=0) + _REACH_MM

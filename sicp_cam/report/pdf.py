@@ -85,6 +85,7 @@ def _story(document: ReportDocument) -> list[Flowable]:
     for index, table in enumerate(document.tables):
         story += _table(table)
         if index == 0:
+            story += [Spacer(1, 3.5 * mm), _text("Signs", 11, bold=True)]
             story += [_text(line, 8.5) for line in document.sign_convention]
     for picture in document.pictures:
         story += [Spacer(1, 4 * mm), _picture(picture)]
@@ -123,7 +124,7 @@ def _table(table: Table) -> list[Flowable]:
     )
     left_out = len(table.rows) - len(shown)
     notes = [f"{left_out} further rows are not printed; result.json has them all."] if left_out else []
-    return [*heading, laid_out, *(_text(note, 8) for note in [*notes, table.note] if note)]
+    return [*heading, laid_out, Spacer(1, 1 * mm), *(_text(note, 8) for note in [*notes, table.note] if note)]
 
 
 def _picture(picture: Picture) -> Flowable:

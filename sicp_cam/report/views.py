@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -76,7 +77,8 @@ def deviation_scene(
 def subdivision_scene(contour: RegisteredContour, registration: Registration) -> Scene:
     """Return the picture of a contour with its segments, subdivision and stability points (figures 5 and 8)."""
     curve = contour.corrected
-    camera = _camera(np.concatenate([curve.points_mm, contour.stability_scan_mm]), [curve], registration, tilt_deg=20.0)
+    alone = replace(registration, contours=(contour,))
+    camera = camera_on(np.concatenate([curve.points_mm, contour.stability_scan_mm]), alone, tilt_deg=20.0)
     lift = camera.mm_per_px * 10
     gaps = [_line(curve, stretch, GAP, 20.0, 0.0) for stretch in marked(curve, ~contour.covered)]
     splits = at(curve, contour.split_s_mm).points_mm if len(contour.split_s_mm) else np.zeros((0, 3))

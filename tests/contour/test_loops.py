@@ -38,18 +38,17 @@ def test_a_walk_goes_once_around_the_centre(synthetic, ring_outlines):
         assert abs(turn.sum()) == pytest.approx(2 * np.pi, abs=0.4)
 
 
-def test_a_gap_wider_than_the_reach_opens_the_loop_and_a_narrow_one_does_not(synthetic):
-    hole = synthetic.circle(50.0)
-    uv = synthetic.material([hole], spacing_mm=SPACING, depth_mm=30.0, seed=6)
-    for width, expected in ((5.0, 1), (40.0, 0)):
-        seen = synthetic.without_gaps(uv, hole, [(100.0, 100.0 + width)], depth_mm=40.0)
-        points = synthetic.plane(seen)
-        loops = [
-            loop
-            for loop in rim_loops(cloud_rim(points, cKDTree(points)), SPACING, 200.0)
-            if length(loop) < 1.1 * hole.length_mm
-        ]
-        assert len(loops) == expected
+@pytest.mark.parametrize(("gap", "around"), [(3.0, 0.0), (40.0, 50.0)])
+def test_the_loop_steps_over_a_narrow_gap_and_goes_around_a_wide_one(synthetic, gap, around):
+    hole = synthetic.circle(60.0)
+    uv = synthetic.material([hole], spacing_mm=SPACING, seed=6)
+    points = synthetic.plane(synthetic.without_gaps(uv, hole, [(100.0, 100.0 + gap)], depth_mm=25.0))
+    (loop,) = [
+        loop
+        for loop in rim_loops(cloud_rim(points, cKDTree(points)), SPACING, 200.0)
+        if np.linalg.norm(loop, axis=1).max() < 100.0
+    ]
+    assert length(loop) == pytest.approx(hole.length_mm + around, rel=0.06)
 
 
 def test_short_loops_are_dropped(synthetic, ring_outlines):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -402,6 +404,7 @@ def test_any_hole_anywhere_is_exact(radius, axis, angle, shift, tmp_path, in_pro
         (b"<!DOCTYPE html><html></html>", "byte 0: is an HTML page"),
         (b"ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=", "byte 39: is cut short"),
         (b"ISO-10303-21;\n#1=CARTESIAN_POINT('',(0.,1.E400,0.));END-ISO-10303-21;", "byte 40: holds the number 1.E400"),
+        (b"ISO-10303-21;\n#1=A('%s');END-ISO-10303-21;" % (b"x" * 2_000_000), "byte 19: has a text of more than"),
     ],
 )
 def test_bytes_that_are_no_step_file_never_reach_the_kernel(content, says, tmp_path, monkeypatch):
@@ -413,6 +416,29 @@ def test_bytes_that_are_no_step_file_never_reach_the_kernel(content, says, tmp_p
     assert str(caught.value).startswith(f"{path}, byte ")
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_quotes_in_comments_do_not_count_and_long_lists_are_no_text():
+    numbers = b"1.,2.," * 20_000
+    assert step._long_literal(b"/* don't */ #1=A('',(%s));#2=A('b');" % numbers, 65536) is None
+    assert step._long_literal(b"/* don't */ #1=A('%s');" % numbers, 65536) == 17
+    assert step._long_literal(b"#1=A('%s');" % (b"x" * 10), 10) is None
+    assert step._long_literal(b"#1=A('%s');" % (b"x" * 11), 10) == 5
+
+
+@pytest.mark.parametrize("number", ["1.E308", "1.E-400", "1.E0000000309X", "E400", "'1.E400'"])
+def test_numbers_that_a_double_holds_pass(number):
+    assert not step._OVERFLOW.search(b"#1=A(%s,0.);" % number.encode())
+
+
+@pytest.mark.parametrize("number", ["1.E309", "-1.5E+400", "1.e0400", "1.E123456789"])
+def test_numbers_that_no_double_holds_are_found(number):
+    assert step._OVERFLOW.search(b"#1=A( %s ,0.);" % number.encode())[1] == number.encode()
+
+
+def test_reader_does_not_load_the_kernel():
+    code = "import sys, sicp_formats.step; sys.exit('OCP' in sys.modules or 'cadquery' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_truncated_file_is_refused_with_its_length(plate_file, tmp_path):
@@ -463,7 +489,7 @@ def test_edge_that_leaves_its_surface_is_refused(plate_file, tmp_path, in_proces
     vector = re.search(r"= LINE\('',#\d+,(#\d+)\)", text)[1]
     direction = re.search(rf"{vector} = VECTOR\('',(#\d+)", text)[1]
     path = tmp_path / "bent.step"
-    path.write_text(re.sub(rf"({direction} = DIRECTION\('',\()[^)]*", r"\g<1>0.1,0.1,1.", text))
+    path.write_text(re.sub(rf"({direction} = DIRECTION\('',\()[^)]*", r"\g<1>1.,1.,1.", text))
     with pytest.raises(CadError, match=r"bent\.step: the edge through \(.*\) is .* mm off its surface"):
         read_part(path)
 

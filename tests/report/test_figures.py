@@ -20,8 +20,13 @@ def count(png: bytes, colour: str) -> int:
     return int((np.abs(pixels(png) - wanted).max(axis=2) <= 2).sum())
 
 
-def test_error_shows_both_curves_and_the_gaps(job) -> None:
-    png = error_along_contour(job.contour, "sicp", 0.5)
+@pytest.fixture(scope="module")
+def error_png(job) -> bytes:
+    return error_along_contour(job.contour, "sicp", 0.5)
+
+
+def test_error_shows_both_curves_and_the_gaps(job, error_png: bytes) -> None:
+    png = error_png
     picture = pixels(png)
     assert picture.shape == (1100, 1600, 3)
     assert len(np.unique(picture.reshape(-1, 3) @ [65536, 256, 1])) > 100
@@ -55,9 +60,8 @@ def test_correction_shows_its_three_curves(job) -> None:
     assert correction_along_contour(still) != png
 
 
-def test_same_input_same_bytes_whatever_the_user_has_set(job) -> None:
-    first = error_along_contour(job.contour, "sicp", 0.5)
+def test_same_input_same_bytes_whatever_the_user_has_set(job, error_png: bytes) -> None:
     with matplotlib.rc_context({"axes.facecolor": "black", "font.size": 30.0, "lines.linewidth": 9.0}):
         second = error_along_contour(job.contour, "sicp", 0.5)
-    assert first == second
-    assert b"Software" not in first
+    assert error_png == second
+    assert b"Software" not in error_png

@@ -16,7 +16,7 @@ from sicp_cam.report.figures import correction_along_contour
 from sicp_cam.report.pdf import build
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def made(result, job) -> ReportDocument:
     return document(
         result, {"correction_1.png": correction_along_contour(job.contour)}, job="porthole", version="1.2.3"
