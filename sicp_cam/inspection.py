@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from sicp_cam import output, plugins
-from sicp_cam.contour.loops import rim_loops
+from sicp_cam.contour.loops import mesh_loops, resampled, rim_loops
 from sicp_cam.correction import contours_of
 from sicp_cam.errors import InputError
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import FloatArray, IntArray, Part, Scan, Source, ToolPath
-from sicp_cam.registration.scan_surface import prepared
+from sicp_cam.registration.scan_surface import ScanSurface, prepared
 from sicp_cam.result_document import findings_list, input_entry
 
 __all__ = ["inspect"]
@@ -66,7 +66,7 @@ def inspect(
     else:
         scan = plugins.read_scan(path, units=units, limits=limits, options=options or {})
         surface = prepared(scan)
-        loops = rim_loops(surface.rim, surface.spacing_mm, LEAST_LOOP_SPACINGS * surface.spacing_mm)
+        loops = _scan_loops(surface)
         body = _head(path, role, scan.source, len(scan.points_mm), scan.findings)
         body |= _scan_body(scan, surface.spacing_mm, loops)
         points, faces = scan.points_mm, scan.faces
@@ -97,6 +97,15 @@ def _part_body(part: Part) -> dict[str, Any]:
         for number, contour in enumerate(contours_of(part), 1)
     ]
     return {"bounds": _bounds(part.mesh.vertices_mm), "triangles": len(part.mesh.faces), "contours": contours}
+
+
+def _scan_loops(surface: ScanSurface) -> list[FloatArray]:
+    """Return the closed loops of a scan's rim that are long enough to be an edge, longest first."""
+    least_mm = LEAST_LOOP_SPACINGS * surface.spacing_mm
+    if surface.faces is None:
+        return rim_loops(surface.rim, surface.spacing_mm, least_mm)
+    loops = [surface.points_mm[index] for index, closed in mesh_loops(surface.faces) if closed]
+    return [loop for loop in loops if resampled(loop, len(loop))[1] >= least_mm]
 
 
 def _scan_body(scan: Scan, spacing_mm: float, loops: Sequence[FloatArray]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from sicp_cam.contour.boundary import Rim, cloud_rim, mesh_rim, surface_normals
 from sicp_cam.contour.frames import FramedCurve
-from sicp_cam.model import FloatArray, Scan
+from sicp_cam.model import FloatArray, IntArray, Scan
 
 __all__ = ["ScanSurface", "cropped", "distances_along_normal", "prepared"]
 
@@ -33,6 +33,8 @@ class ScanSurface:
         Point spacing: the side of the square that one point stands for.
     normals
         (n, 3) outward normals where the scan file gives them.
+    faces
+        (m, 3) triangles of a mesh; None for a cloud.
     """
 
     points_mm: FloatArray
@@ -40,13 +42,14 @@ class ScanSurface:
     rim: Rim
     spacing_mm: float
     normals: FloatArray | None = None
+    faces: IntArray | None = None
 
 
 def prepared(scan: Scan) -> ScanSurface:
     """Return the scan with its k-d tree, spacing and rim."""
     tree = cKDTree(scan.points_mm)
     rim = cloud_rim(scan.points_mm, tree) if scan.faces is None else mesh_rim(scan.points_mm, scan.faces)
-    return ScanSurface(scan.points_mm, tree, rim, _spacing_mm(scan.points_mm, tree), scan.normals)
+    return ScanSurface(scan.points_mm, tree, rim, _spacing_mm(scan.points_mm, tree), scan.normals, scan.faces)
 
 
 def _spacing_mm(points_mm: FloatArray, tree: cKDTree) -> float:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sicp_cam.contour.frames import FramedCurve, at, moved
-from sicp_cam.contour.loops import resampled, rim_loops
+from sicp_cam.contour.loops import mesh_loops, resampled, rim_loops
 from sicp_cam.contour.projection import nearest
 from sicp_cam.errors import AmbiguousPoseError, RegistrationError
 from sicp_cam.model import FloatArray
@@ -57,7 +57,10 @@ class Start:
 
 def scan_loops(surface: ScanSurface, length_mm: float) -> list[FloatArray]:
     """Return the closed loops of the scan whose length is within 20 % of the given one, best match first."""
-    loops = rim_loops(surface.rim, surface.spacing_mm, (1.0 - LENGTH_TOLERANCE) * length_mm)
+    if surface.faces is not None:
+        loops = [surface.points_mm[index] for index, closed in mesh_loops(surface.faces) if closed]
+    else:
+        loops = rim_loops(surface.rim, surface.spacing_mm, (1.0 - LENGTH_TOLERANCE) * length_mm)
     off = [abs(resampled(loop, SIGNATURE_POINTS)[1] / length_mm - 1.0) for loop in loops]
     order = np.argsort(off)
     return [loops[i] for i in order if off[i] <= LENGTH_TOLERANCE]
@@ -203,8 +206,8 @@ def _clearest(refined: list[tuple[float, FloatArray]], curve: FramedCurve, circu
         ratio = other_misfit / max(misfit, 1e-9)
         if ratio < CLEAR_RATIO:
             raise AmbiguousPoseError(
-                f"the contour is symmetric: a pose with {difference} fits {ratio:.2f} times as badly as the best one"
-                f" ({misfit:.2f} mm), which is too close to call; give a rough pose or datum pairs with --align FILE"
+                f"the contour is symmetric: a pose with {difference} fits about as well as the best one"
+                f" (misfit {other_misfit:.2f} and {misfit:.2f} mm); give a rough pose or datum pairs with --align FILE"
             )
         return Start(T, misfit, ratio)
     return Start(T, misfit, WORTH_REFINING)
