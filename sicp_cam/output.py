@@ -8,6 +8,7 @@ comes back if anything goes wrong, an interrupt included. A folder without `resu
 from __future__ import annotations
 
 import contextlib
+import json
 import logging
 import os
 import secrets
@@ -21,10 +22,13 @@ from pathlib import Path, PurePosixPath
 from sicp_cam.errors import OutputError, printable
 from sicp_cam.output_names import check_names
 
-__all__ = ["MANIFEST", "check_free", "write"]
+__all__ = ["MANIFEST", "SUPERSEDED", "check_free", "supersede", "write"]
 
 MANIFEST = "result.json"
 """The file that makes a folder a result."""
+
+SUPERSEDED = ".superseded"
+"""What is appended to the name of a program that no longer holds."""
 
 _log = logging.getLogger(__name__)
 
@@ -114,6 +118,46 @@ def write(out: Path, files: Mapping[str, bytes], *, force: bool = False, inputs:
                 with contextlib.suppress(OSError):
                     folder.rmdir()
     return [out / name for name in files]
+
+
+def supersede(out: Path, inputs: Iterable[Path] = ()) -> list[str]:
+    """Rename the programs of an earlier result, because a newer run found that they no longer hold.
+
+    Each program `X` of the folder's `result.json` becomes `X.superseded`, in place of an older one of that name, and so
+    does `result.json`: nothing is lost, but no controller loads it and no script takes it for a result.
+
+    Returns
+    -------
+    list of str
+        The names that were changed; empty if the folder holds no result.
+
+    Raises
+    ------
+    OutputError
+        If a program cannot be renamed.
+    """
+    try:
+        listed = json.loads((out / MANIFEST).read_bytes())["outputs"]
+        names = [str(entry["path"]) for entry in listed if entry["kind"] == "program"]
+        check_names([MANIFEST, *names])
+    except (OSError, ValueError, KeyError, TypeError, OutputError):
+        return []  # no result of ours
+    kept = {Path(path).resolve() for path in inputs}
+    tops = [top for top in _tops(names) if os.path.lexists(out / top) and (out / top).resolve() not in kept]
+    try:
+        for top in [MANIFEST, *tops]:
+            aside = out / f"{top}{SUPERSEDED}"
+            if aside.is_dir() and not aside.is_symlink():
+                _remove(aside)
+            else:
+                aside.unlink(missing_ok=True)
+            (out / top).rename(aside)
+    except OSError as error:
+        raise OutputError(
+            f"{printable(str(out))}: the earlier program no longer holds, and cannot be renamed:"
+            f" {error.strerror or error}; remove it by hand"
+        ) from error
+    return tops
 
 
 def _tops(names: Iterable[str]) -> list[str]:

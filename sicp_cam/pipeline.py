@@ -16,7 +16,7 @@ import numpy as np
 from sicp_cam import output, plugins
 from sicp_cam.alignment import read_alignment
 from sicp_cam.correction import PartRegistration, check_scan_unit, choose_contours, contours_of
-from sicp_cam.errors import JobError, PathError, RegistrationError, ReportError, WarningsError, printable
+from sicp_cam.errors import InputError, JobError, PathError, RegistrationError, ReportError, WarningsError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
 from sicp_cam.model import FloatArray, Part, Program, Scan, ToolPath
@@ -185,9 +185,20 @@ def correct(job: Job, progress: Progress = _silent) -> Outcome:
     SicpError
         Of the kind that gives the exit code; no output exists then.
     """
-    started = time.perf_counter()
     if not job.dry_run:
         output.check_free(job.out, _names_known_before(job), job.force, _input_paths(job))
+    try:
+        return _corrected_and_written(job, progress)
+    except (InputError, RegistrationError, PathError, WarningsError):
+        if job.force and not job.dry_run and (names := output.supersede(job.out, _input_paths(job))):
+            _log.warning(
+                "%s: the earlier %s no longer holds: renamed *%s", job.out, ", ".join(names), output.SUPERSEDED
+            )
+        raise
+
+
+def _corrected_and_written(job: Job, progress: Progress) -> Outcome:
+    started = time.perf_counter()
     correction = run(job, progress)
     clock = _Clock(progress)
     with clock.step("write", 0.6):

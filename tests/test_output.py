@@ -1,4 +1,5 @@
 import errno
+import json
 import os
 import stat
 import threading
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sicp_cam.errors import OutputError
-from sicp_cam.output import check_free, write
+from sicp_cam.output import check_free, supersede, write
 from sicp_cam.output_names import joined, name_problem
 
 NEW = {
@@ -311,3 +312,34 @@ def test_of_two_runs_at_once_one_wins_whole(tmp_path):
     contents = files_of(tmp_path)
     assert set(contents) == set(NEW)
     assert len(set(contents.values())) == 1
+
+
+def test_a_program_that_no_longer_holds_is_renamed_and_nothing_else(tmp_path):
+    outputs = [{"kind": "program", "path": "edge/start.pgx"}, {"kind": "program", "path": "edge.csv"}]
+    result = json.dumps({"outputs": [*outputs, {"kind": "report", "path": "report.pdf"}]}).encode()
+    fill(tmp_path, {"edge/start.pgx": b"go", "edge.csv": b"1", "report.pdf": b"2", "result.json": result})
+    fill(tmp_path, {"edge.superseded/old.pgx": b"older"})
+    assert supersede(tmp_path) == ["edge", "edge.csv"]
+    assert files_of(tmp_path) == {
+        "edge.superseded/start.pgx": b"go",
+        "edge.csv.superseded": b"1",
+        "report.pdf": b"2",
+        "result.json.superseded": result,
+    }
+
+
+@pytest.mark.parametrize(
+    "result", [b"", b"[]", b'{"outputs": [{"kind": "program", "path": "../x"}]}', b'{"outputs": 3}', None]
+)
+def test_a_folder_that_is_no_result_of_ours_is_left_alone(tmp_path, result):
+    fill(tmp_path, {"x": b"1"} if result is None else {"x": b"1", "result.json": result})
+    before = files_of(tmp_path)
+    assert supersede(tmp_path) == []
+    assert files_of(tmp_path) == before
+
+
+def test_an_input_is_never_renamed(tmp_path):
+    result = json.dumps({"outputs": [{"kind": "program", "path": "edge.csv"}]}).encode()
+    fill(tmp_path, {"edge.csv": b"1", "result.json": result})
+    assert supersede(tmp_path, [tmp_path / "edge.csv"]) == []
+    assert (tmp_path / "edge.csv").exists()

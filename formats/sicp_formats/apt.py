@@ -113,6 +113,7 @@ class _Reader:
             "CIRCLE": arcs.circle,
             "INDIRV": arcs.direction,
             "TLON,GOFWD": self._along_circle,
+            "MULTAX": self._multax,
             "UNITS": self._unit,
             "UNIT": self._unit,
             "MSYS": frames.msys,
@@ -235,6 +236,9 @@ class _Reader:
             raise self.moves.error("UNITS needs MM, INCHES, CM or METERS; correct the line", line)
         self.moves.state_unit(unit_name, line)
         self._machine.update_feed()
+
+    def _multax(self, line: int, arguments: str) -> None:
+        """Pass over MULTAX: an axis is read wherever one stands, and every move of the model has one."""
 
     # --- everything else ---
 

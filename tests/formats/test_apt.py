@@ -55,7 +55,6 @@ def test_reads_a_whole_contour_program(tmp_path: Path) -> None:
     assert path.source is not None
     assert (path.source.unit, path.source.unit_stated, path.source.format) == ("mm", True, "APT")
     assert [(e.kind, e.value, e.before_move) for e in path.events if e.kind is not EventKind.COMMENT] == [
-        (EventKind.OTHER, 0.0, 0),
         (EventKind.TOOL, 3.0, 0),
         (EventKind.SPINDLE, 18000.0, 0),
         (EventKind.COOLANT, 1.0, 2),
