@@ -11,7 +11,7 @@ from sicp_cam.limits import DEFAULT_LIMITS, Limits
 
 if TYPE_CHECKING:
     from sicp_cam.model import Part, Scan, ToolPath
-    from sicp_cam.pipeline import Correction
+    from sicp_cam.result import Correction
 
 __all__ = ["correct", "read_part", "read_path", "read_scan"]
 
