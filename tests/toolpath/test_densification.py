@@ -54,6 +54,13 @@ def test_a_straight_cut_that_stays_straight_stays_one_move(made):
     assert len(done.corrected) == 2
 
 
+@pytest.mark.xfail(strict=True, reason="the straight mean of two axes is shorter than 1, which is taken for a bend")
+def test_an_axis_that_turns_within_a_cut_does_not_divide_it_where_nothing_is_deformed(made):
+    nominal = made.straight()
+    source = made.path([[20.0, 0.0, 0.0], [120.0, 0.0, 0.0]], [[0.0, 0.0, 1.0], [0.0, np.sin(0.3), np.cos(0.3)]])
+    assert len(made.corrected(source, [made.registered(nominal, nominal)]).corrected) == 2
+
+
 @pytest.mark.parametrize(("radius", "expected"), [(1e6, 2), (1e4, 51)])
 def test_only_a_cut_that_bends_by_more_than_the_chord_is_divided(made, radius, expected):
     """100 mm bent to a radius: the arrow is L^2/8R, 0.00125 and 0.125 mm against a chord of 0.01."""
