@@ -62,7 +62,7 @@ def outline_of(dense, closed):
 
 def polar(radius, *, hole=True, centre=(0.0, 0.0)):
     """Return the closed outline r(angle): a hole runs clockwise, an outer edge counter-clockwise."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 200_000, endpoint=False) * (-1.0 if hole else 1.0)
+    angle = np.linspace(0.0, 2.0 * np.pi, 20_000, endpoint=False) * (-1.0 if hole else 1.0)
     r = radius(angle)
     return outline_of(np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1) + centre, True)
 
@@ -85,7 +85,7 @@ def egg(size, **options):
 
 def rounded_rectangle(width, height, radius, *, hole=False):
     a, b = 0.5 * width - radius, 0.5 * height - radius
-    turn = np.linspace(0.0, 0.5 * np.pi, 5000)
+    turn = np.linspace(0.0, 0.5 * np.pi, 2000)
     corners = [
         np.array(centre) + radius * np.stack([np.cos(turn + start), np.sin(turn + start)], axis=1)
         for centre, start in (((a, b), 0), ((-a, b), np.pi / 2), ((-a, -b), np.pi), ((a, -b), 3 * np.pi / 2))
@@ -142,8 +142,14 @@ def contour(outline, sheet=plane, *, step_mm=1.0, start_mm=0.0, rings_mm=(10.0, 
 
 
 def material(outlines, *, sampling="jittered", spacing_mm=2.0, depth_mm=60.0, seed=0, jitter=0.8):
-    """Sample the plane within `depth_mm` of outlines, on their material side: (n, 2) places."""
+    """Sample the plane within `depth_mm` of outlines, on their material side, as (n, 2) places.
+
+    `sampling` is `jittered` (a grid), `random`, or `voxels` (dense, then thinned to one point per cell).
+    """
     rng = np.random.default_rng(seed)
+    if sampling == "voxels":
+        fine = material(outlines, sampling="random", spacing_mm=spacing_mm / 3.0, depth_mm=depth_mm, seed=seed)
+        return thinned(fine, spacing_mm, seed)
     bound = np.concatenate([outline.points for outline in outlines])
     low, high = bound.min(axis=0) - depth_mm, bound.max(axis=0) + depth_mm
     if not outlines[0].closed:
@@ -156,6 +162,15 @@ def material(outlines, *, sampling="jittered", spacing_mm=2.0, depth_mm=60.0, se
         uv += rng.uniform(-0.5, 0.5, uv.shape) * jitter * spacing_mm
     depths = np.stack([outline.depth(uv)[0] for outline in outlines])
     return uv[(depths > 0.0).all(axis=0) & (depths.min(axis=0) < depth_mm)]
+
+
+def thinned(uv, cell_mm, seed):
+    """Replace the places in each cell of a turned grid by their mean, as scanner software does."""
+    turn = np.random.default_rng(seed).uniform(0.0, 0.5 * np.pi)
+    turned = uv @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    column, row = np.floor(turned / cell_mm).astype(np.int64).T
+    _, cell, count = np.unique(column * 100_000 + row, return_inverse=True, return_counts=True)
+    return np.stack([np.bincount(cell, weights=axis) / count for axis in uv.T], axis=1)
 
 
 def without_gaps(uv, outline, gaps_mm, depth_mm=25.0):
@@ -222,7 +237,14 @@ def errors(curve, outline, sheet=plane, pose=None):
     return SimpleNamespace(normal=normal, out=out, both=np.hypot(normal, out), axis_deg=axis)
 
 
+class Builders(SimpleNamespace):
+    """The builders of this module; Hypothesis prints the arguments of a failing test, so this stays short."""
+
+    def __repr__(self):
+        return "synthetic"
+
+
 @pytest.fixture(scope="session")
 def synthetic():
     """Give the builders of this module to the tests."""
-    return SimpleNamespace(**{name: value for name, value in globals().items() if callable(value)})
+    return Builders(**{name: value for name, value in globals().items() if callable(value)})

@@ -92,7 +92,9 @@ def test_a_small_hole_beside_a_long_edge_is_not_dropped(synthetic):
     ]
     (edge, axes_1), (hole, axes_2) = path_along(contours[0]), path_along(contours[1])
     hole, axes_2 = hole[::2], axes_2[::2]
-    chosen = assign(np.vstack([edge, hole]), np.vstack([axes_1, axes_2]), np.ones(len(edge) + len(hole), bool), contours)
+    chosen = assign(
+        np.vstack([edge, hole]), np.vstack([axes_1, axes_2]), np.ones(len(edge) + len(hole), bool), contours
+    )
     assert (chosen.contour[len(edge) :] == 1).all()
 
 

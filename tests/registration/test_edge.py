@@ -24,9 +24,7 @@ def surface_of(synthetic, outlines, sheet=None, *, sampling="jittered", seed=0, 
 
 def shifted(curve, depth_mm=0.0, height_mm=0.0):
     points = curve.points_mm + depth_mm * curve.inward + height_mm * curve.outward
-    return FramedCurve(
-        curve.s_mm, points, curve.tangents, curve.inward, curve.outward, curve.length_mm, curve.closed
-    )
+    return FramedCurve(curve.s_mm, points, curve.tangents, curve.inward, curve.outward, curve.length_mm, curve.closed)
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +56,14 @@ def test_the_edge_is_found_without_the_bias_of_the_rim(synthetic, hole, sheet, c
     assert np.abs(biases).max() < 0.15 * SPACING
     assert np.mean(rim_biases) > 0.22 * SPACING
     assert np.mean(rim_biases) > 4.0 * np.abs(np.mean(biases))
+
+
+@pytest.mark.xfail(
+    strict=True, reason="where cells thin the points the edge is denser than the interior: -0.18 spacing"
+)
+def test_thinning_by_voxels_does_not_shift_the_edge(synthetic, hole, sheet, curve):
+    found = measure(curve, surface_of(synthetic, [hole], sheet, sampling="voxels"), reach_mm=REACH)
+    assert abs(found.depth_mm[found.covered].mean()) < 0.1 * SPACING
 
 
 @pytest.mark.parametrize(("sampling", "limit"), [("random", 0.25), ("jittered", 0.15), ("mesh", 0.15)])

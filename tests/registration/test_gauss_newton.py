@@ -13,9 +13,7 @@ UP = np.array([0.0, 0.0, 1.0])
 def rows_to(points, targets, weights=None):
     """Return equations for all three components of each point."""
     w = np.ones(len(points)) if weights is None else weights
-    return stacked(
-        *(Rows(points, np.tile(axis, (len(points), 1)), (targets - points) @ axis, w) for axis in np.eye(3))
-    )
+    return stacked(*(Rows(points, np.tile(axis, (len(points), 1)), (targets - points) @ axis, w) for axis in np.eye(3)))
 
 
 def plane_rows(points, heights):
@@ -33,7 +31,9 @@ def circle_rows(radius=50.0, count=200):
 
 @settings(deadline=None, max_examples=40)
 @given(
-    seed=st.integers(0, 2**32 - 1), turn=st.tuples(*[st.floats(-0.1, 0.1)] * 3), shift=st.tuples(*[st.floats(-5, 5)] * 3)
+    seed=st.integers(0, 2**32 - 1),
+    turn=st.tuples(*[st.floats(-0.1, 0.1)] * 3),
+    shift=st.tuples(*[st.floats(-5, 5)] * 3),
 )
 def test_a_motion_is_recovered_to_rounding(seed, turn, shift):
     points = np.random.default_rng(seed).uniform(-100.0, 100.0, (30, 3)) + 500.0
@@ -47,7 +47,7 @@ def test_a_motion_is_recovered_to_rounding(seed, turn, shift):
 
 def test_weights_decide_which_of_two_truths_is_followed():
     points = np.random.default_rng(0).uniform(-100.0, 100.0, (40, 3))
-    right, wrong = points + [1.0, 2.0, 3.0], points + 50.0
+    right, wrong = points + np.array([1.0, 2.0, 3.0]), points + 50.0
     rows = stacked(rows_to(points, right), rows_to(points, wrong, np.zeros(len(points))))
     np.testing.assert_allclose(motion_step(rows, 0.0), from_parts(np.eye(3), [1.0, 2.0, 3.0]), atol=1e-9)
 

@@ -18,7 +18,9 @@ def curve(synthetic):
 def points_on(curve, surface, count=20_000, noise=0.0, seed=0):
     rng = np.random.default_rng(seed)
     s, h = rng.uniform(0.0, curve.length_mm, count), rng.uniform(0.0, 24.0, count)
-    return CurveCoordinates(s, np.zeros(count), h, surface(s, h) + rng.normal(0.0, noise, count) if noise else surface(s, h))
+    return CurveCoordinates(
+        s, np.zeros(count), h, surface(s, h) + rng.normal(0.0, noise, count) if noise else surface(s, h)
+    )
 
 
 def test_a_polynomial_surface_is_recovered_but_for_the_ridge(curve):

@@ -43,7 +43,7 @@ def test_every_fold_of_a_symmetric_loop_is_offered(synthetic):
     loop = synthetic.contour(outline, step_mm=outline.length_mm / 256).points_mm
     poses = [pose for misfit, pose in signature_poses(loop, loop) if misfit < 0.1]
     assert len(poses) == 8  # four turns, and each of them with the other side up
-    angles = {round(float(np.degrees(np.arctan2(T[1, 0], T[0, 0]))) % 360) for T in poses if T[2, 2] > 0.0}
+    angles = {round(float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))) % 360 for T in poses if T[2, 2] > 0.0}
     assert angles == {0, 90, 180, 270}
 
 
@@ -87,7 +87,9 @@ def test_an_oval_that_fits_both_ways_round_is_refused(synthetic, dome):
 
 
 @pytest.mark.xfail(
-    strict=True, raises=AmbiguousPoseError, reason="a contour that finds no rim at all in the wrong pose costs it nothing"
+    strict=True,
+    raises=AmbiguousPoseError,
+    reason="a contour that finds no rim at all in the wrong pose costs it nothing",
 )
 def test_another_opening_tells_which_way_round_the_oval_lies(synthetic, dome):
     outlines = [synthetic.oval(100.0, 75.0), synthetic.circle(20.0, centre=(150.0, 20.0))]

@@ -48,9 +48,7 @@ def test_a_long_cut_along_a_bent_edge_gets_equal_steps(made, bent, length, step,
 
 def test_a_straight_cut_that_stays_straight_stays_one_move(made):
     nominal = made.straight()
-    done = made.corrected(
-        made.path([[20.0, 0.0, 0.0], [120.0, 0.0, 0.0]]), [made.registered(nominal, nominal)]
-    )
+    done = made.corrected(made.path([[20.0, 0.0, 0.0], [120.0, 0.0, 0.0]]), [made.registered(nominal, nominal)])
     assert len(done.corrected) == 2
 
 
@@ -97,7 +95,9 @@ def test_the_chord_is_kept_where_the_steps_are_long(made, bent):
     assert departure(done, source, [bent], step_mm=50.0) <= 0.01
 
 
-@pytest.mark.xfail(strict=True, reason="a cut no longer than step_mm is never divided, so chord_mm does not hold for it")
+@pytest.mark.xfail(
+    strict=True, reason="a cut no longer than step_mm is never divided, so chord_mm does not hold for it"
+)
 def test_the_chord_is_kept_within_a_cut_of_one_step(made):
     """An edge with a bump of 0.3 mm, 8 mm long, met by a cut of 10 mm that step_mm lets be one piece."""
     nominal = made.straight()
@@ -166,9 +166,7 @@ def test_moves_without_length_stay_single(made, bent):
 
 
 def test_the_axis_between_two_points_is_of_unit_length(made, bent):
-    source = made.path(
-        [[20.0, 0.0, 0.0], [120.0, 0.0, 0.0]], [[0.0, 0.0, 1.0], [0.0, np.sin(0.6), np.cos(0.6)]]
-    )
+    source = made.path([[20.0, 0.0, 0.0], [120.0, 0.0, 0.0]], [[0.0, 0.0, 1.0], [0.0, np.sin(0.6), np.cos(0.6)]])
     done = made.corrected(source, [bent])
     np.testing.assert_allclose(np.linalg.norm(done.nominal.axes, axis=1), 1.0, atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(done.corrected.axes, axis=1), 1.0, atol=1e-14)

@@ -64,20 +64,18 @@ def test_between_stations_the_curve_is_met_within_its_chord(made):
     a = x / RADIUS
     true = np.stack([RADIUS * np.sin(a), 0 * a, RADIUS * np.cos(a) - RADIUS], 1)
     assert np.linalg.norm(moved_tips - true, axis=1).max() <= 1.0**2 / (8.0 * RADIUS) * 1.01
-    assert np.degrees(np.arccos(np.clip((axes * np.stack([np.sin(a), 0 * a, np.cos(a)], 1)).sum(1), -1, 1))).max() < 1e-3
+    assert (
+        np.degrees(np.arccos(np.clip((axes * np.stack([np.sin(a), 0 * a, np.cos(a)], 1)).sum(1), -1, 1))).max() < 1e-3
+    )
 
 
 def test_a_round_hole_rolled_to_a_cylinder(made):
     nominal = made.hole(100.0)
     bent = made.rolled(nominal, RADIUS)
     x, y, _ = nominal.points_mm[::30].T
-    moved_tips, axes = follow(
-        nominal.points_mm[::30], np.tile([0.0, 0, 1], (40, 1)), [made.registered(nominal, bent)]
-    )
+    moved_tips, axes = follow(nominal.points_mm[::30], np.tile([0.0, 0, 1], (40, 1)), [made.registered(nominal, bent)])
     a = x / RADIUS
-    np.testing.assert_allclose(
-        moved_tips, np.stack([RADIUS * np.sin(a), y, RADIUS * np.cos(a) - RADIUS], 1), atol=1e-9
-    )
+    np.testing.assert_allclose(moved_tips, np.stack([RADIUS * np.sin(a), y, RADIUS * np.cos(a) - RADIUS], 1), atol=1e-9)
     np.testing.assert_allclose(axes, np.stack([np.sin(a), 0 * a, np.cos(a)], 1), atol=1e-12)
 
 
@@ -87,7 +85,7 @@ def test_a_rigid_deformation_moves_near_moves_with_it_and_far_ones_with_the_pose
     contours = [made.registered(nominal, made.moved(nominal, shift), rigid=made.moved(nominal, POSE))]
     rng = np.random.default_rng(5)
     near = nominal.points_mm[::7] + rng.uniform(-10.0, 10.0, (len(nominal.points_mm[::7]), 3))
-    far = near + [0.0, 0.0, 150.0]
+    far = near + np.array([0.0, 0.0, 150.0])
     axes = unit([0.0, 0.0, 1.0] + 0.2 * rng.normal(size=near.shape))
     tips, turned = follow(near, axes, contours, POSE)
     np.testing.assert_allclose(tips, apply(shift, near), atol=1e-9)
@@ -187,9 +185,7 @@ def test_status_words_name_seen_and_bridged_cuts_and_all_else(made):
 _OPEN_END = "the end of an open edge is judged by the coverage of its beginning: (station + 1) % len wraps around"
 
 
-@pytest.mark.parametrize(
-    "closed", [True, pytest.param(False, marks=pytest.mark.xfail(strict=True, reason=_OPEN_END))]
-)
+@pytest.mark.parametrize("closed", [True, pytest.param(False, marks=pytest.mark.xfail(strict=True, reason=_OPEN_END))])
 def test_the_last_stretch_of_a_contour_is_judged_by_its_own_ends(made, closed):
     nominal = made.hole(50.0, count=100) if closed else made.straight(100.0, 1.0)
     covered = np.ones(len(nominal), dtype=bool)
