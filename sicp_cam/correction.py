@@ -41,7 +41,7 @@ class PartRegistration:
     def assignment(self, path: ToolPath) -> Assignment:
         """Return which registered contour each move of a path in the part frame follows."""
         curves = [contour.nominal for contour in self.result.contours]
-        return assign(path.tips_mm, path.axes, ~path.rapid, curves)
+        return assign(path.tips_mm, path.axes, ~path.rapid, curves, self.gates.path_distance_mm)
 
     def apply(self, path: ToolPath) -> CorrectedPath:
         """Return a path in the part frame corrected to the scan; nothing is judged and nothing is written."""
@@ -106,7 +106,8 @@ def choose_contours(
     feed = ~path.rapid
     if not feed.any():
         raise PathError("the path has rapid moves only; there is nothing to correct")
-    found = assign(path.tips_mm, path.axes, feed, [framed(contour) for contour in contours])
+    curves = [framed(contour) for contour in contours]
+    found = assign(path.tips_mm, path.axes, feed, curves, path_distance_mm)
     distance = float(np.median(found.distance_mm[feed]))
     if distance > path_distance_mm:
         raise PathError(

@@ -19,7 +19,8 @@ AXIS_PENALTY_MM = 10.0
 The edges of both skins of a thin part lie closer together than a path may run beside its edge; only the tool axis,
 which leaves the part on the outer side, tells them apart.
 """
-LEAST_SHARE = 0.02
+SAME_EDGE_MM = 1.0
+"""Contours that lie this close to a move are edges of the same place: two skins' corners, a skin and its wall."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,25 +42,51 @@ class Assignment:
     used: tuple[int, ...]
 
 
-def assign(tips_mm: FloatArray, axes: FloatArray, cutting: BoolArray, contours: Sequence[FramedCurve]) -> Assignment:
+def assign(
+    tips_mm: FloatArray,
+    axes: FloatArray,
+    cutting: BoolArray,
+    contours: Sequence[FramedCurve],
+    on_contour_mm: float,
+) -> Assignment:
     """Assign every move of a path to the contour that it follows.
+
+    Contours are taken one by one, the one that most of the remaining cutting moves prefer first; with it go all moves
+    that run along the same edge, so that a tilted tool does not fall to and fro between a skin and its wall.
 
     Parameters
     ----------
     tips_mm, axes
         (n, 3) tips and unit tool axes, part frame.
     cutting
-        (n,) True for moves that cut; only they decide which contours are used.
+        (n,) True for feed moves; those near a contour decide which contours are used.
     contours
         At least one contour, part frame.
+    on_contour_mm
+        Feed moves further than this from every contour approach or retract, and do not decide.
     """
     distance = np.empty((len(tips_mm), len(contours)))
-    score = np.empty_like(distance)
+    agreement = np.empty_like(distance)
     for i, curve in enumerate(contours):
         s_mm, distance[:, i] = nearest(tips_mm, curve)
-        agreement = np.sum(at(curve, s_mm).outward * axes, axis=1)
-        score[:, i] = distance[:, i] + AXIS_PENALTY_MM * (1.0 - agreement)
-    wins = np.bincount(np.argmin(score[cutting], axis=1), minlength=len(contours))
-    used = tuple(int(i) for i in np.argsort(-wins, kind="stable") if wins[i] >= max(1.0, LEAST_SHARE * cutting.sum()))
+        agreement[:, i] = np.sum(at(curve, s_mm).outward * axes, axis=1)
+    score = distance + AXIS_PENALTY_MM * (1.0 - agreement)
+    best = np.argmin(score, axis=1)
+    rows = np.arange(len(tips_mm))
+    voting = cutting & (distance[rows, best] <= on_contour_mm)
+    if not voting.any():
+        voting = cutting if cutting.any() else np.ones(len(tips_mm), dtype=bool)
+    used = _most_wanted(best, voting, (distance <= distance[rows, best, None] + SAME_EDGE_MM) & (agreement > 0.0))
     chosen = np.array(used)[np.argmin(score[:, used], axis=1)]
-    return Assignment(chosen, distance[np.arange(len(tips_mm)), chosen], used)
+    return Assignment(chosen, distance[rows, chosen], used)
+
+
+def _most_wanted(best: IntArray, voting: BoolArray, alongside: BoolArray) -> tuple[int, ...]:
+    """Return the contours taken one by one until every voting move has one alongside."""
+    used: list[int] = []
+    left = voting.copy()
+    while left.any():
+        taken = int(np.argmax(np.bincount(best[left], minlength=alongside.shape[1])))
+        used.append(taken)
+        left &= ~alongside[:, taken] & (best != taken)
+    return tuple(used)

@@ -58,7 +58,9 @@ def framed(contour: Contour) -> FramedCurve:
     points = contour.points_mm
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     T, B, N = orthonormal(contour.tangents, contour.normals)
-    return FramedCurve(np.concatenate([[0.0], np.cumsum(steps)]), points, T, B, N, contour.length_mm, contour.closed)
+    s_mm = np.concatenate([[0.0], np.cumsum(steps)])
+    closing = float(np.linalg.norm(points[0] - points[-1])) if contour.closed else 0.0
+    return FramedCurve(s_mm, points, T, B, N, float(s_mm[-1]) + closing, contour.closed)
 
 
 def moved(curve: FramedCurve, T_to_from: FloatArray) -> FramedCurve:

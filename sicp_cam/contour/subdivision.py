@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sicp_cam.contour.frames import FramedCurve, at
-from sicp_cam.model import FloatArray
+from sicp_cam.model import BoolArray, FloatArray
 
 __all__ = ["Subdivision", "bends", "subdivide", "weights"]
 
@@ -88,8 +88,9 @@ def subdivide(
         (g, 2) start and end of each gap of the scan, apart from one another, within 0 and the length; None for none.
     """
     gaps = np.zeros((0, 2)) if unseen_mm is None else unseen_mm
+    bends_mm = bends_mm[~_within(bends_mm, gaps)]
     longest = (curve.length_mm - float(np.sum(gaps[:, 1] - gaps[:, 0]))) / pieces
-    fixed = _spread(bends_mm, 0.5 * longest, curve)
+    fixed = _spread(bends_mm, 0.5 * longest, curve, gaps)
     ends = np.append(fixed[1:], fixed[0] + curve.length_mm) if curve.closed else fixed[1:]
     arcs = [_equal_arcs(a, b, longest, gaps, curve.length_mm) for a, b in zip(fixed, ends, strict=False)]
     splits = np.concatenate(arcs) if curve.closed else np.append(np.concatenate(arcs), curve.length_mm)
@@ -105,14 +106,29 @@ def _equal_arcs(start: float, end: float, longest: float, gaps: FloatArray, leng
     """Return the start of each piece between two fixed splits; `end` may pass the length of a closed contour."""
     knots = np.unique(np.clip(np.concatenate([[start, end], gaps.ravel(), gaps.ravel() + length_mm]), start, end))
     middle = np.mod(0.5 * (knots[1:] + knots[:-1]), length_mm)
-    hidden = ((middle[:, None] > gaps[:, 0]) & (middle[:, None] < gaps[:, 1])).any(axis=1)
+    hidden = _within(middle, gaps)
     seen = np.concatenate([[0.0], np.cumsum(np.where(hidden, 0.0, np.diff(knots)))])
     count = max(1, int(np.ceil(seen[-1] / longest - 1e-9)))
     wanted = np.arange(1, count) * seen[-1] / count
     return np.concatenate([[start], np.interp(wanted, seen, knots)])
 
 
-def _spread(bends_mm: FloatArray, apart_mm: float, curve: FramedCurve) -> FloatArray:
+def _within(s_mm: FloatArray, gaps: FloatArray) -> BoolArray:
+    """Say which arc lengths lie in a gap, ends included."""
+    inside: BoolArray = ((s_mm[:, None] >= gaps[:, 0]) & (s_mm[:, None] <= gaps[:, 1])).any(axis=1)
+    return inside
+
+
+def _seen_start(curve: FramedCurve, gaps: FloatArray) -> float:
+    """Return the arc length furthest from all gaps, where a closed contour without bends is first divided."""
+    if not len(gaps) or not _within(np.zeros(1), gaps)[0]:
+        return 0.0
+    ends = np.append(gaps[1:, 0], gaps[0, 0] + curve.length_mm)
+    widest = int(np.argmax(ends - gaps[:, 1]))
+    return float(np.mod(0.5 * (gaps[widest, 1] + ends[widest]), curve.length_mm))
+
+
+def _spread(bends_mm: FloatArray, apart_mm: float, curve: FramedCurve, gaps: FloatArray) -> FloatArray:
     """Return the fixed splits: the bends that lie far enough apart, or one start, or the ends of an open curve."""
     kept: list[float] = [] if curve.closed else [0.0]
     for s in np.sort(bends_mm):
@@ -122,7 +138,7 @@ def _spread(bends_mm: FloatArray, apart_mm: float, curve: FramedCurve) -> FloatA
         return np.array([s for s in kept if curve.length_mm - s >= apart_mm or s == 0.0] + [curve.length_mm])
     if len(kept) > 1 and kept[0] + curve.length_mm - kept[-1] < apart_mm:
         kept.pop()
-    return np.array(kept or [0.0])
+    return np.array(kept or [_seen_start(curve, gaps)])
 
 
 def weights(subdivision: Subdivision, s_mm: FloatArray) -> FloatArray:

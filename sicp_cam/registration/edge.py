@@ -3,7 +3,8 @@
 The points at the rim of a scan lie inside the material by about half the point spacing, because the edge falls between
 points. Registering to them cuts too deep. The edge is therefore estimated from *all* points behind it: over a surface
 covered with density rho and ending at depth delta, the points of a window of standard deviation W sum up to
-sum G exp(-h / tau) = rho tau W sqrt(2 pi) exp(-delta / tau), which is solved for delta.
+sum G exp(-h / tau) = rho tau W sqrt(2 pi) exp(-delta / tau), which is solved for delta. The density rho is that of the
+interior, corrected by how much denser the scan is at its rim.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 
 from sicp_cam.contour.frames import FramedCurve, at
 from sicp_cam.contour.projection import CurveCoordinates, coordinates
@@ -24,13 +26,20 @@ from sicp_cam.registration.stations import even_stations, interpolated, windows
 __all__ = ["EdgeMeasurement", "gaps", "measure", "on_curve"]
 
 RIM_WIDTH_SPACINGS = 3.0
-EDGE_WIDTH_SPACINGS = 5.0
+EDGE_WIDTH_SPACINGS = 8.0
 """Standard deviation of the edge window along the contour, in point spacings."""
-DECAY_SPACINGS = 0.35
-INTERIOR_SPACINGS = (2.0, 7.0)
-"""Depths between which the density of the interior is counted."""
+DECAY_SPACINGS = 0.15
+INTERIOR_SPACINGS = (2, 7)
+"""Depths between which the density of the interior is counted, in slices of one spacing."""
+FULL_SLICE = 0.3
+"""Least number of points of a slice of the interior, over that of the fullest slice."""
+RIM_ZONE_SPACINGS = (0.05, 0.4)
+"""Depths behind the edge between which the density of the rim is counted."""
+RIM_ROUNDS = 30
 BEFORE_RIM_SPACINGS = 1.5
 """Points further outside of the rim than this are no part of the surface."""
+GAP_MARGIN_SPACINGS = 5.0
+"""How far from a gap the edge is trusted: nearer, much of its window lies in the gap."""
 COVERED_SHARE = 0.3
 """Least density of points behind the edge, over the median density along the contour."""
 
@@ -86,7 +95,7 @@ def measure(curve: FramedCurve, surface: ScanSurface, *, reach_mm: float) -> Edg
     height = local.height_mm(at_edge)
     covered = np.isfinite(depth) & np.isfinite(height) & (rim_weight > COVERED_SHARE * np.median(rim_weight))
     covered &= _dense(_only(seen, local.on_surface), at_edge, stations, curve, spacing_mm)
-    trusted = _away_from_gaps(covered, stations, curve, EDGE_WIDTH_SPACINGS * spacing_mm)
+    trusted = _away_from_gaps(covered, stations, curve, GAP_MARGIN_SPACINGS * spacing_mm)
     return EdgeMeasurement(stations, depth, height, local.slope(at_edge), covered, trusted, local.noise_mm)
 
 
@@ -120,17 +129,63 @@ def _edge_depth(
     rim = interpolated(np.nan_to_num(rim_depth), stations, seen.s_mm, curve)
     h = seen.inward_mm - rim
     near = (h > -BEFORE_RIM_SPACINGS * spacing_mm) & (h < 12.0 * spacing_mm)
-    s, h = seen.s_mm[near], h[near]
+    s, h, rim = seen.s_mm[near], h[near], rim[near]
     # At depth h a slice of ds on the curve is 1 + kappa h wide: each point stands for that much less length.
     narrow = 1.0 / np.clip(1.0 + interpolated(_geodesic_curvature(curve, stations), stations, s, curve) * h, 0.5, 2.0)
     (G,) = windows(s, stations, curve, width)
-    low, high = (limit * spacing_mm for limit in INTERIOR_SPACINGS)
-    density = (G @ (narrow * ((h >= low) & (h < high)))) / ((high - low) * width * np.sqrt(2.0 * np.pi))
+    area = width * np.sqrt(2.0 * np.pi) * spacing_mm
+    density = _interior_density(G, h / spacing_mm, narrow) / area
     moment = G @ (narrow * np.exp(-h / tau))
     with np.errstate(divide="ignore", invalid="ignore"):
-        depth = -tau * np.log(moment / (density * tau * width * np.sqrt(2.0 * np.pi)))
+        depth = -tau * np.log(moment * spacing_mm / (density * tau * area))
         depth -= 1.0 / (8.0 * np.sqrt(np.pi) * width * density)  # mean of the logarithm of a noisy sum
-    return np.where(np.isfinite(depth), depth + rim_depth, np.nan)
+        # The rim wanders from point to point; what h was counted from is its mean over the window.
+        depth += (G @ (narrow * rim)) / (G @ narrow)
+    depth += tau * np.log(_rim_density(seen.inward_mm[near], depth, s, stations, curve, narrow, spacing_mm, tau))
+    return np.where(np.isfinite(depth) & np.isfinite(rim_depth), depth, np.nan)
+
+
+def _interior_density(G: sparse.csr_array, h_spacings: FloatArray, narrow: FloatArray) -> FloatArray:
+    """Return the weighted number of points per spacing of depth at each station, behind the edge.
+
+    Slices of one spacing are counted; those that hold far fewer points than the fullest lie beyond the other side of a
+    narrow flange, or in a gap behind the edge, and do not count.
+    """
+    slices = range(*INTERIOR_SPACINGS)
+    counts = np.stack([G @ (narrow * ((h_spacings >= k) & (h_spacings < k + 1))) for k in slices], axis=1)
+    full = counts >= FULL_SLICE * counts.max(axis=1, keepdims=True)
+    return np.asarray((counts * full).sum(axis=1) / np.maximum(full.sum(axis=1), 1))
+
+
+def _rim_density(
+    inward_mm: FloatArray,
+    depth: FloatArray,
+    s_mm: FloatArray,
+    stations: FloatArray,
+    curve: FramedCurve,
+    narrow: FloatArray,
+    spacing_mm: float,
+    tau: float,
+) -> float:
+    """Return the density of points just behind the edge over that of the interior, pooled over all stations.
+
+    Scanners that thin their points to one per voxel leave up to twice the density at the rim, because a voxel that the
+    edge cuts keeps its point too. Taken for the interior's density this would put the edge outside of the material.
+    The ratio r and the depth it corrects depend on each other, and are found by iteration.
+    """
+    low, high = RIM_ZONE_SPACINGS
+    first, last = INTERIOR_SPACINGS
+    ratio = 1.0
+    for _ in range(RIM_ROUNDS):
+        edge = interpolated(np.nan_to_num(depth + tau * np.log(ratio)), stations, s_mm, curve)
+        x = (inward_mm - edge) / spacing_mm
+        rim = narrow[(x > low) & (x < high)].sum() / (high - low)
+        slices = [narrow[(x >= k) & (x < k + 1)].sum() for k in range(first, last)]
+        full = [count for count in slices if count >= FULL_SLICE * max(slices)]
+        if not full or not sum(full):
+            return 1.0
+        ratio = 0.5 * ratio + 0.5 * float(np.clip(rim / (sum(full) / len(full)), 0.5, 2.5))
+    return ratio
 
 
 def _geodesic_curvature(curve: FramedCurve, stations: FloatArray) -> FloatArray:
@@ -189,4 +244,6 @@ def gaps(measured: EdgeMeasurement, curve: FramedCurve) -> FloatArray:
     hidden = np.concatenate([[False], ~measured.covered, [False]])
     change = np.flatnonzero(np.diff(hidden.astype(np.int64)))
     edges = np.clip((change.reshape(-1, 2) - 0.5) * step, 0.0, curve.length_mm)
+    if curve.closed and hidden[1] and hidden[-2]:
+        edges[-1, 1] = curve.length_mm  # one gap over the seam, stated in two parts
     return np.asarray(edges, dtype=np.float64)

@@ -30,7 +30,7 @@ RING_SHARE = 0.5
 """Weight of all stability points together over the weight of all rim points together."""
 FACING = 0.3
 """Least cosine between a rim point's open side and the contour's own open side."""
-MIN_RIM_POINTS = 50
+MIN_RIM_POINTS = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -65,12 +65,13 @@ def cropped(scan: Scan, curves: Sequence[FramedCurve], reach_mm: float) -> Scan:
     A cropped mesh gets a new rim where it is cut, which lies at the reach and so outside of every smaller one.
     """
     keep = np.zeros(len(scan.points_mm), dtype=bool)
+    margin_mm = 1.1 * reach_mm  # the curve is looked at every tenth of the reach only
     for curve in curves:
-        low, high = curve.points_mm.min(axis=0) - reach_mm, curve.points_mm.max(axis=0) + reach_mm
+        low, high = curve.points_mm.min(axis=0) - margin_mm, curve.points_mm.max(axis=0) + margin_mm
         boxed = np.flatnonzero(((scan.points_mm >= low) & (scan.points_mm <= high)).all(axis=1))
         step = max(1, int(0.1 * reach_mm * len(curve) / curve.length_mm))
         tree = cKDTree(curve.points_mm[::step])
-        distance, _ = tree.query(scan.points_mm[boxed], distance_upper_bound=1.1 * reach_mm)
+        distance, _ = tree.query(scan.points_mm[boxed], distance_upper_bound=margin_mm)
         keep[boxed[np.isfinite(distance)]] = True
     number = np.cumsum(keep) - 1
     faces = None if scan.faces is None else number[scan.faces[keep[scan.faces].all(axis=1)]]

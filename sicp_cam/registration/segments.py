@@ -28,7 +28,7 @@ __all__ = ["Targets", "blended", "point_to_curve", "point_to_point", "register_s
 ITERATIONS = 12
 PRIOR = 1e-4
 RING_SHARE = 0.25
-SLIDE_SHARE = 0.1
+SLIDE_SHARE = 0.003
 """Weight that holds a piece against sliding along the contour, where its edge alone would let it go."""
 
 

@@ -42,7 +42,7 @@ def plate(synthetic):
 @pytest.mark.parametrize(("beside", "above"), [(0.0, 0.0), (5.0, 0.0), (5.0, -3.0), (8.0, -4.5)])
 def test_the_tool_axis_tells_the_outer_skin_from_the_inner_one_and_from_the_wall(plate, beside, above):
     tips, axes = path_along(plate[0], beside, above)
-    chosen = assign(tips, axes, np.ones(len(tips), bool), plate)
+    chosen = assign(tips, axes, np.ones(len(tips), bool), plate, 20.0)
     assert chosen.used == (0,)
     assert (chosen.contour == 0).all()
     np.testing.assert_allclose(chosen.distance_mm, np.hypot(beside, above), atol=0.05)
@@ -50,13 +50,13 @@ def test_the_tool_axis_tells_the_outer_skin_from_the_inner_one_and_from_the_wall
 
 def test_from_below_the_inner_skin_is_chosen(plate):
     tips, axes = path_along(plate[0], 5.0, -3.0, axis=-UP)
-    assert assign(tips, axes, np.ones(len(tips), bool), plate).used == (1,)
+    assert assign(tips, axes, np.ones(len(tips), bool), plate, 20.0).used == (1,)
 
 
 def test_an_axis_that_leans_by_thirty_degrees_still_chooses_its_skin(plate):
     lean = np.cos(np.radians(30.0)) * plate[0].outward + np.sin(np.radians(30.0)) * plate[0].tangents
     tips, _ = path_along(plate[0], 4.0, -2.0)
-    assert assign(tips, lean, np.ones(len(tips), bool), plate).used == (0,)
+    assert assign(tips, lean, np.ones(len(tips), bool), plate, 20.0).used == (0,)
 
 
 def test_a_path_over_two_holes_follows_both_the_longer_first(synthetic):
@@ -66,7 +66,7 @@ def test_a_path_over_two_holes_follows_both_the_longer_first(synthetic):
     ]
     (first, axes_1), (second, axes_2) = path_along(holes[0], 4.0), path_along(holes[1], 4.0)
     tips, axes = np.vstack([first, second]), np.vstack([axes_1, axes_2])
-    chosen = assign(tips, axes, np.ones(len(tips), bool), holes)
+    chosen = assign(tips, axes, np.ones(len(tips), bool), holes, 20.0)
     assert chosen.used == (1, 0)
     assert (chosen.contour == np.repeat([0, 1], [len(first), len(second)])).all()
 
@@ -77,7 +77,7 @@ def test_moves_that_do_not_cut_choose_no_contour_but_get_one(synthetic):
     approach = holes[1].points_mm[:20] + 50.0 * UP
     tips = np.vstack([approach, cut])
     cutting = np.arange(len(tips)) >= 20
-    chosen = assign(tips, np.tile(UP, (len(tips), 1)), cutting, holes)
+    chosen = assign(tips, np.tile(UP, (len(tips), 1)), cutting, holes, 20.0)
     assert chosen.used == (0,)
     assert (chosen.contour == 0).all()
     assert chosen.distance_mm[:20].min() > 100.0
@@ -102,5 +102,5 @@ def test_a_small_hole_beside_a_long_edge_is_not_dropped(synthetic):
 def test_a_path_over_sixty_holes_follows_all_of_them(synthetic):
     holes = [skin(synthetic, synthetic.circle(5.0, centre=(30.0 * i, 0.0))) for i in range(60)]
     tips = np.vstack([hole.points_mm for hole in holes])
-    chosen = assign(tips, np.tile(UP, (len(tips), 1)), np.ones(len(tips), bool), holes)
+    chosen = assign(tips, np.tile(UP, (len(tips), 1)), np.ones(len(tips), bool), holes, 20.0)
     assert sorted(chosen.used) == list(range(60))
