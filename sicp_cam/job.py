@@ -22,17 +22,20 @@ It holds values only: nothing in it is run.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, get_type_hints
 
 from sicp_cam.errors import JobError, printable
+from sicp_cam.input_files import absent, wrong_places
 from sicp_cam.job_layers import OPTION_TABLES, Layer
+from sicp_cam.job_tables import GATES, RANGES, TABLES, table_key
 from sicp_cam.limits import Limits
-from sicp_cam.option_values import Range, Word, converted, nearest, table
+from sicp_cam.option_values import Word, closest, converted, nearest, table
 from sicp_cam.output_names import name_problem
+from sicp_cam.plugin_registry import POSTPROCESSORS, owners
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
 
@@ -111,26 +114,13 @@ class Job:
 
 
 _HINTS = get_type_hints(Job)
-_TABLES: Mapping[str, Any] = {
-    "registration": RegistrationSettings,
-    "toolpath": ToolPathSettings,
-    "gates": GateLimits,
-    "limits": Limits,
-}
-_KEYS = tuple(f.name for f in fields(Job) if f.name not in _TABLES and not f.name.endswith("_options"))
+_KEYS = tuple(f.name for f in fields(Job) if f.name not in TABLES and not f.name.endswith("_options"))
 _REQUIRED = tuple(f.name for f in fields(Job) if f.default is MISSING and f.default_factory is MISSING)
-_FILES = ("cad", "scan", "path")
 _LISTS = ("post", "report", "override", "contour")
 _NAME_LENGTH = 120
+_ROLES = {"part": "cad", "scan": "scan", "path": "path"}
+_NO_REPORT = "; or none for no report"
 _CONTOUR = "must be auto or numbers of contours from 1, such as 1,2; see sicp-cam inspect"
-_RANGES: Mapping[str, Mapping[str, Range]] = {
-    "registration": {"segments": (1, 10_000), "overlap": (0.0, 0.5), "reach_mm": (0.01, 1e4)},
-    "toolpath": {"feed_mm_min": (1e-3, 1e6), "step_mm": (1e-3, 1e3), "chord_mm": (1e-5, 10.0)},
-    "gates": {"coverage": (0.0, 1.0), "axis_deg": (0.0, 180.0)},
-    "limits": {f.name: (1.0, float("inf")) for f in fields(Limits)},
-}
-
-
 @dataclass(frozen=True, slots=True)
 class _Stated:
     value: object
@@ -160,8 +150,9 @@ def build(*layers: Layer) -> Job:
                 problems[key] = str(error)
         elif problem := _misplaced(key, stated[key].value):
             problems[key] = problem
-    for name, kind in _TABLES.items():
-        values[name], wrong = table(kind, _below(stated, name), _RANGES[name])
+    problems |= _wrong_places(values, stated)
+    for name, kind in TABLES.items():
+        values[name], wrong = table(kind, _below(stated, name), RANGES[name])
         problems |= {f"{name}.{key}": problem for key, problem in wrong.items()}
     for role in ("scan", "part", "path"):
         values[f"{role}_options"] = MappingProxyType(_below(stated, f"options.{role}"))
@@ -190,22 +181,38 @@ def _plain_value(key: str, stated: _Stated) -> object:
     try:
         value = converted(_listed(stated.value) if key in _LISTS else stated.value, _HINTS[key])
     except ValueError as error:
-        raise ValueError(_CONTOUR if key == "contour" else str(error)) from error
+        told = f"{error}{_NO_REPORT}" if key == "report" else str(error)
+        raise ValueError(_CONTOUR if key == "contour" else told) from error
     if isinstance(value, Path):
         return _checked_path(key, stated.layer.folder / value)
     if isinstance(value, tuple) and len(set(value)) < len(value):
         raise ValueError("names something twice; leave one out")
     if key == "contour" and value != "auto" and (not value or min(value) < 1):
         raise ValueError(_CONTOUR)
-    if key == "post" and not value:
-        raise ValueError("names no postprocessor; see sicp-cam plugins")
-    if key == "method" and value not in METHODS:
-        raise ValueError(f"must be one of {', '.join(METHODS)}, not '{printable(str(value), 60)}'")
+    if key in _CHOICES:
+        _check_choices(key, (value,) if isinstance(value, str) else value)
     if key == "name" and (problem := name_problem(value)):
         raise ValueError(f"'{printable(value, 60)}' {problem}")
     if key == "name" and len(value.encode()) > _NAME_LENGTH:
         raise ValueError(f"is longer than {_NAME_LENGTH} bytes")
     return value
+
+
+def _check_choices(key: str, chosen: tuple[str, ...]) -> None:
+    if key == "post" and not chosen:
+        raise ValueError("names no postprocessor; see sicp-cam plugins")
+    what, choices = _CHOICES[key]
+    known = choices()
+    for word in chosen:
+        if word not in known:
+            raise ValueError(f"no {what} '{printable(word, 60)}'; {nearest(word, known)}")
+
+
+_CHOICES: Mapping[str, tuple[str, Callable[[], Collection[str]]]] = {
+    "post": ("postprocessor", lambda: owners(POSTPROCESSORS)),
+    "method": ("method", lambda: METHODS),
+    "override": ("gate", lambda: GATES),
+}
 
 
 def _listed(value: object) -> object:
@@ -225,16 +232,25 @@ def _checked_path(key: str, path: Path) -> Path:
     elif path.is_dir():
         raise ValueError(f"{name} is a folder; give a file")
     elif not path.exists():
-        raise ValueError(f"{name}: no such file")
+        raise ValueError(f"{name}: {absent(path)}{'; or give auto or given' if key == 'align' else ''}")
     return path
+
+
+def _wrong_places(values: Mapping[str, Any], stated: Mapping[str, _Stated]) -> dict[str, str]:
+    files = {
+        role: values[key]
+        for role, key in _ROLES.items()
+        if key in values and f"options.{role}.format" not in stated  # which says what the file is
+    }
+    return {_ROLES[role]: problem for role, problem in wrong_places(files).items()}
 
 
 def _misplaced(key: str, value: object) -> str | None:
     """Say why a key that is no plain one has no place in a job; what lies below a table, the table itself checks."""
     first, _, rest = key.partition(".")
-    if key in (*_TABLES, "options") or (first == "options" and rest in OPTION_TABLES):
+    if key in (*TABLES, "options") or (first == "options" and rest in OPTION_TABLES):
         return None if value == {} else f"must be a table, not {printable(str(value), 60)}"
-    if first in _TABLES:
+    if first in TABLES:
         return None
     if first == "options":
         option_table = rest.partition(".")[0]
@@ -243,7 +259,20 @@ def _misplaced(key: str, value: object) -> str | None:
         return f"{first} takes a value; the options of its reader or post stand in the table options.{first}"
     if first in _KEYS:
         return f"{first} takes a value, not a table"
-    return f"unknown key; {nearest(first, (*_KEYS, *_TABLES, 'options'))}"
+    return f"unknown key; {_meant(key)}"
+
+
+def _meant(key: str) -> str:
+    """Say which key was meant: one of a table whose name was left out, an option of a post, or one spelt nearly so."""
+    first, _, rest = key.partition(".")
+    if whole := table_key(key):
+        return f"did you mean {whole}?"
+    if rest and first in owners(POSTPROCESSORS):
+        return f"did you mean options.post.{printable(key)}?"
+    known = (*_KEYS, *TABLES, "options")
+    inner = {f.name: f"{name}.{f.name}" for name, kind in TABLES.items() for f in fields(kind)}
+    near = None if closest(first, known) else closest(key, inner)
+    return f"did you mean {inner[near]}?" if near else nearest(first, known)
 
 
 def _post_options(

@@ -56,20 +56,11 @@ def load(path: Path) -> Layer:
     """
     name = printable(str(path))
     try:
-        with path.open("rb") as stream:
-            content = stream.read(_JOB_BYTES + 1)
+        values = tomllib.loads(_content(path).decode("utf-8-sig"))
     except OSError as error:
-        raise JobError(f"{name}: cannot be read: {error.strerror}; give a job file") from error
-    if len(content) > _JOB_BYTES:
-        raise JobError(f"{name}: larger than {_JOB_BYTES} bytes; this is no job file")
-    try:
-        values = tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise JobError(f"{name}, byte {error.start}: not UTF-8; save the job file as UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise JobError(f"{name}: not TOML: {printable(str(error))}") from error
-    except RecursionError as error:
-        raise JobError(f"{name}: nested too deeply to be a job file") from error
+        raise JobError(f"{name}: cannot be read: {_why_not(path, error)}") from error
+    except (ValueError, RecursionError) as error:  # of which UnicodeDecodeError and TOMLDecodeError are kinds
+        raise JobError(f"{name}{no_job_text(path, error)}") from error
     return Layer(name, dict(_flat(values, "")), path.parent)
 
 

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar, Union
 
 from sicp_cam.errors import printable
 
-__all__ = ["Word", "converted", "nearest", "table"]
+__all__ = ["Range", "Word", "closest", "converted", "nearest", "table"]
 
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}", re.ASCII)
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?", re.ASCII)
@@ -120,13 +120,24 @@ def nearest(key: str, known: typing.Iterable[str]) -> str:
     >>> nearest("stabilty", ["stability", "overlap"]), nearest("x", ["stability"])
     ('did you mean stability?', 'known: stability')
     """
+    names = sorted(known)
+    close = closest(key, names)
+    if close:
+        return f"did you mean {printable(close)}?"
+    return f"known: {', '.join(map(printable, names))}" if names else "none is known here"
+
+
+def closest(word: str, known: typing.Iterable[str]) -> str | None:
+    """Return the known word that was probably meant, whatever its case; None if none is near.
+
+    >>> closest("VAL3", ["csv", "val3"]), closest("x", ["csv"])
+    ('val3', None)
+    """
     import difflib
 
-    names = sorted(printable(name) for name in known)
-    close = difflib.get_close_matches(key, names, n=1)
-    if close:
-        return f"did you mean {close[0]}?"
-    return f"known: {', '.join(names)}" if names else "none is known here"
+    names = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(word.lower(), names, n=1)
+    return names[close[0]] if close else None
 
 
 def _within(value: Any, allowed: Range) -> Any:
@@ -212,7 +223,10 @@ def _choice(value: object, choices: tuple[Any, ...]) -> Any:
             same = value == str(choice)
         if same:
             return choice
-    raise ValueError(f"must be one of {', '.join(str(choice) for choice in choices)}, not {_shown(value)}")
+    names = [str(choice) for choice in choices]
+    close = closest(value, names) if isinstance(value, str) else None
+    hint = f" (did you mean {close}?)" if close else ""
+    raise ValueError(f"must be one of {', '.join(names)}, not {_shown(value)}{hint}")
 
 
 def _one_of(value: object, kinds: tuple[Any, ...]) -> Any:

@@ -139,7 +139,7 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
     with clock.step("register", 0.3):
         result = register_contours(chosen, inputs.scan, T_start, method=job.method, settings=job.registration)
         registration = PartRegistration(result, job.toolpath, job.gates)
-        gates = overridden(registration_gates(result.contours, job.gates), job.override)
+        gates = overridden(registration_gates(result, job.gates), job.override)
         _refuse(gates, RegistrationError)
     with clock.step("correct", 0.55):
         corrected = registration.apply(inputs.path)

@@ -88,8 +88,9 @@ def broken(plugins: tuple[Plugin, ...]) -> tuple[Finding, ...]:
 def owners(group: str) -> dict[str, list[Plugin]]:
     """Return the claims on each name of a group, those of its override group behind the others; imports none."""
     claims: dict[str, list[Plugin]] = {}
+    registered = entry_points()
     for override in (False, True):
-        for entry in entry_points(group=f"{group}.override" if override else group):
+        for entry in registered.select(group=f"{group}.override" if override else group):
             dist = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown distribution"
             name = entry.name.lower() if group == FORMATS else entry.name
             claims.setdefault(name, []).append(Plugin(group, name, entry.value, dist, override))

@@ -6,7 +6,6 @@ How a plug-in registers stands in `sicp_cam.plugin_registry`; our own formats an
 from __future__ import annotations
 
 import inspect
-import typing
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,17 +13,18 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from sicp_cam.errors import InputError, JobError, printable
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
+from sicp_cam.option_help import annotations_of
 from sicp_cam.option_values import converted, nearest
+from sicp_cam.plugin_options import keyword_names, takes_any
 from sicp_cam.plugin_registry import FORMATS, POSTPROCESSORS, ROLES, owner, owners
 
 if TYPE_CHECKING:
     from sicp_cam.model import Part, Scan, ToolPath
 
-__all__ = ["postprocessor", "read_part", "read_path", "read_scan", "reader", "roles"]
+__all__ = ["check_reader", "postprocessor", "read_part", "read_path", "read_scan", "reader", "roles"]
 
 _Kind = TypeVar("_Kind")
 _NO_OPTIONS: Mapping[str, object] = MappingProxyType({})
-_GIVEN_BY_US = ("units", "limits")
 
 
 def roles(path: Path) -> tuple[str, ...]:
@@ -130,6 +130,17 @@ def read_path(
     return _read("path", path, units, limits, options, ToolPath)
 
 
+def check_reader(role: str, path: Path, options: Mapping[str, object] = _NO_OPTIONS) -> None:
+    """Check that a file's suffix has a reader in a role, and that it takes these options; opens no file.
+
+    Raises
+    ------
+    InputError, JobError
+        As `read_scan` does for the same reasons.
+    """
+    _ready(role, path, options)
+
+
 def postprocessor(name: str, options: Mapping[str, object] = _NO_OPTIONS) -> Any:
     """Return the postprocessor of that name, made with its options.
 
@@ -147,12 +158,8 @@ def postprocessor(name: str, options: Mapping[str, object] = _NO_OPTIONS) -> Any
 def _read(
     role: str, path: Path, units: str | None, limits: Limits, options: Mapping[str, object], kind: type[_Kind]
 ) -> _Kind:
-    suffix = options.get("format")
-    if suffix is not None and not isinstance(suffix, str):
-        raise JobError(f"{role}.format: must be a suffix such as 'csv', not {printable(str(suffix), 40)}")
-    function = reader(role, path, suffix=suffix)
-    rest = {key: value for key, value in options.items() if key != "format"}
-    result = function(path, units=units, limits=limits, **_arguments(role, function, rest))
+    function, arguments = _ready(role, path, options)
+    result = function(path, units=units, limits=limits, **arguments)
     if not isinstance(result, kind):
         raise JobError(
             f"plug-in {function.__module__}:{function.__qualname__} answered with a {type(result).__name__} instead of "
@@ -161,18 +168,23 @@ def _read(
     return result
 
 
+def _ready(role: str, path: Path, options: Mapping[str, object]) -> tuple[Callable[..., Any], dict[str, Any]]:
+    """Return the reader of a file and its options in their types."""
+    suffix = options.get("format")
+    if suffix is not None and not isinstance(suffix, str):
+        raise JobError(f"{role}.format: must be a suffix such as 'csv', not {printable(str(suffix), 40)}")
+    function = reader(role, path, suffix=suffix)
+    rest = {key: value for key, value in options.items() if key != "format"}
+    return function, _arguments(role, function, rest)
+
+
 def _arguments(role: str, function: Callable[..., Any], options: Mapping[str, object]) -> dict[str, Any]:
-    parameters = inspect.signature(function).parameters
-    free = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values())
-    known = [
-        name
-        for name, parameter in parameters.items()
-        if parameter.kind is parameter.KEYWORD_ONLY and name not in _GIVEN_BY_US
-    ]
-    hints = typing.get_type_hints(function) if options else {}
+    known = keyword_names(function)
+    taken = inspect.signature(function).parameters.keys() - set(known)
+    hints = annotations_of(function) if options else {}
     arguments, problems = {}, []
     for key, value in options.items():
-        if key not in known and (not free or key in parameters or key in _GIVEN_BY_US):
+        if key not in known and (not takes_any(function) or key in taken):
             problems.append(f"{role}.{printable(key)}: unknown option; {nearest(key, [*known, 'format'])}")
             continue
         try:

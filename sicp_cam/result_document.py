@@ -100,6 +100,7 @@ def registration_entry(registration: Registration) -> dict[str, Any]:
         "noise_mm": registration.noise_mm,
         "freedoms": registration.freedoms.tolist(),
         "symmetry_ratio": registration.symmetry,
+        "side_ratio": registration.side,
         "rigid": residual_summary(before, covered),
         "corrected": residual_summary(after, covered),
         "leave_out": None,

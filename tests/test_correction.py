@@ -95,7 +95,6 @@ def test_a_path_through_both_openings_chooses_both_the_most_cut_first(holes):
 _COLUMNS = ("tips_mm", "axes", "feeds_mm_min", "rapid", "lines")
 
 
-@pytest.mark.xfail(strict=True, reason="contours with less than 2 % of the feed moves are dropped, and nobody is told")
 def test_a_small_opening_beside_a_large_one_is_not_left_out(holes):
     """10 moves round a small hole after 1000 round a large one: they would be moved by the rigid pose alone."""
     there, back = path_on(holes[0], every=1), path_on(holes[1], every=30)

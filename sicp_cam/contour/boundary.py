@@ -82,7 +82,10 @@ def surface_normals(neighbours_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def cloud_rim(points_mm: FloatArray, tree: cKDTree) -> Rim:
-    """Find the rim of an (n, 3) cloud by the open angle that a point's neighbours leave in its tangent plane."""
+    """Find the rim of an (n, 3) cloud by the open angle that a point's neighbours leave in its tangent plane.
+
+    No two points may be equal: copies would take the places of neighbours and have no direction.
+    """
     _, near = tree.query(points_mm, k=min(NEIGHBOURS + 1, len(points_mm)))
     offsets = points_mm[near[:, 1:]] - points_mm[:, None]
     N, _ = surface_normals(points_mm[near])

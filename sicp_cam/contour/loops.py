@@ -11,6 +11,9 @@ from sicp_cam.model import FloatArray, IntArray
 __all__ = ["mesh_loops", "resampled", "rim_loops"]
 
 MARCH_SPACINGS = 4.0
+OPPOSED = -0.1
+SIDEWAYS = -0.35
+"""Cosine of the largest turn of a walk."""
 
 
 def mesh_loops(faces: IntArray) -> list[tuple[IntArray, bool]]:
@@ -79,30 +82,39 @@ def _walk(rim: Rim, tree: cKDTree, seed: int, reach: float) -> tuple[list[int], 
     points = rim.points_mm
     walk, visited, heading = [seed], {seed}, np.zeros(3)
     while True:
-        around = np.array([i for i in tree.query_ball_point(points[walk[-1]], reach) if i not in visited], np.int64)
-        ahead, score = _progress(rim, walk[-1], around, heading)
-        if not len(around) or not np.isfinite(score.max()):
-            return walk, len(walk) > 8 and bool(np.linalg.norm(points[walk[-1]] - points[seed]) < 2.0 * reach)
-        best = int(np.argmax(score))
-        visited.update(around[ahead <= ahead[best]].tolist())
-        walk.append(int(around[best]))
+        here = points[walk[-1]]
+        around = np.array([i for i in tree.query_ball_point(here, reach) if i not in visited], np.int64)
+        chosen = _next(rim, walk[-1], around, heading)
+        if chosen is None:
+            return walk, len(walk) > 8 and bool(np.linalg.norm(here - points[seed]) < 2.0 * reach)
+        step = points[chosen] - here
+        passed = (points[around] - here) @ step <= step @ step
+        visited.update(around[passed].tolist())
+        walk.append(chosen)
         tail = points[walk[-1]] - points[walk[max(0, len(walk) - 3)]]
-        heading = tail / np.linalg.norm(tail)
+        heading = tail / max(float(np.linalg.norm(tail)), 1e-12)
 
 
-def _progress(rim: Rim, here: int, around: IntArray, heading: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return how far ahead each neighbour lies, and how good a next step it is (-inf if none)."""
+def _next(rim: Rim, here: int, around: IntArray, heading: FloatArray) -> int | None:
+    """Return the rim point to go on to, None if there is none ahead.
+
+    Far and straight ahead is best; around the corner of a gap, up to 110 degrees aside, is good enough.
+    """
+    if not len(around):
+        return None
     step = rim.points_mm[around] - rim.points_mm[here]
-    if not heading.any() and len(around):
+    if not heading.any():
         # Ahead is square to the open side, in whichever sense the furthest neighbour lies.
         square = step - np.outer(step @ rim.open_directions[here], rim.open_directions[here])
-        furthest = square[np.argmax(np.linalg.norm(square, axis=1))]
-        heading = furthest / max(float(np.linalg.norm(furthest)), 1e-12)
-    ahead = step @ heading
-    aside = np.linalg.norm(step - np.outer(ahead, heading), axis=1)
-    # The open directions of one rim agree from point to point; those of the rim across a narrow strip do not.
-    alike = rim.open_directions[around] @ rim.open_directions[here] > 0.3
-    return ahead, np.where(alike & (ahead > 0.0), ahead - 0.5 * aside, -np.inf)
+        heading = square[np.argmax(np.linalg.norm(square, axis=1))]
+        heading = heading / max(float(np.linalg.norm(heading)), 1e-12)
+    length = np.linalg.norm(step, axis=1)
+    cosine = (step @ heading) / np.maximum(length, 1e-12)
+    # The open directions turn slowly along a rim, by a right angle at a corner; across a narrow strip they oppose.
+    alike = rim.open_directions[around] @ rim.open_directions[here] > OPPOSED
+    score = np.where(alike & (cosine > SIDEWAYS), length * (cosine - SIDEWAYS) ** 2, -np.inf)
+    best = int(np.argmax(score))
+    return int(around[best]) if np.isfinite(score[best]) else None
 
 
 def resampled(points_mm: FloatArray, count: int) -> tuple[FloatArray, float]:

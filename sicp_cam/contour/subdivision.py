@@ -115,8 +115,8 @@ def _equal_arcs(start: float, end: float, longest: float, gaps: FloatArray, leng
 
 def _within(s_mm: FloatArray, gaps: FloatArray) -> BoolArray:
     """Say which arc lengths lie in a gap, ends included."""
-    inside: BoolArray = ((s_mm[:, None] >= gaps[:, 0]) & (s_mm[:, None] <= gaps[:, 1])).any(axis=1)
-    return inside
+    inside = (s_mm[:, None] >= gaps[:, 0]) & (s_mm[:, None] <= gaps[:, 1])
+    return np.asarray(inside.any(axis=1), dtype=np.bool_)
 
 
 def _seen_start(curve: FramedCurve, gaps: FloatArray) -> float:

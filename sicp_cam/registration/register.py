@@ -18,8 +18,8 @@ from sicp_cam.registration.scan_surface import ScanSurface, cropped, prepared
 from sicp_cam.registration.segments import blended
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
 from sicp_cam.registration.sicp import Subdivided, paper_s_icp, s_icp
-from sicp_cam.registration.start import find_start, is_symmetric
-from sicp_cam.rigid_motion import apply
+from sicp_cam.registration.start import find_start, is_symmetric, side_ratio
+from sicp_cam.rigid_motion import apply, is_rigid
 
 __all__ = ["register_contours"]
 
@@ -58,6 +58,12 @@ def register_contours(
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; use one of {', '.join(METHODS)}")
+    if not contours:
+        raise RegistrationError("no contour to register; choose one with --contour")
+    if T_start is not None and not is_rigid(T_start):
+        raise RegistrationError(
+            "the start pose is no rigid motion: a finite 4x4 matrix without scale or mirror is needed"
+        )
     settings = settings or RegistrationSettings()
     nominal = {n: NominalContour(framed(c), c.ring_points_mm, c.ring_normals) for n, c in contours.items()}
     symmetry = None
@@ -68,6 +74,9 @@ def register_contours(
     near = [moved(contour.curve, T_start) for contour in nominal.values()]
     surface = prepared(_enough(cropped(scan, near, CROP_MARGIN * settings.reach_mm), settings))
     pose = register_rigidly(list(nominal.values()), surface, T_start, reach_mm=settings.reach_mm)
+    side = None
+    if symmetry is None:
+        side = side_ratio(list(nominal.values()), surface, pose.T_scan_part, reach_mm=settings.reach_mm)
     done = tuple(
         _registered_contour(number, contour, surface, pose, method, settings) for number, contour in nominal.items()
     )
@@ -80,6 +89,7 @@ def register_contours(
         noise,
         pose.freedoms,
         symmetry,
+        side,
         _findings(pose, done),
     )
 

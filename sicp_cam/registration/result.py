@@ -108,6 +108,8 @@ class Registration:
         (6,) singular values of the rigid problem, scaled by the radius of gyration, largest first, between 0 and 1.
     symmetry
         Misfit of the next best start pose over that of the one taken; None where the start was given.
+    side
+        Misfit of the pose over that of the part turned over, see `start.side_ratio`; None where the start was found.
     findings
         What was noticed on the way.
     """
@@ -119,4 +121,5 @@ class Registration:
     noise_mm: float
     freedoms: FloatArray
     symmetry: float | None = None
+    side: float | None = None
     findings: tuple[Finding, ...] = ()

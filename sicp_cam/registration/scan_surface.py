@@ -46,10 +46,19 @@ class ScanSurface:
 
 
 def prepared(scan: Scan) -> ScanSurface:
-    """Return the scan with its k-d tree, spacing and rim."""
+    """Return the scan with its k-d tree, spacing and rim; copies of a point in a cloud count once."""
+    scan = scan if scan.faces is not None else _without_copies(scan)
     tree = cKDTree(scan.points_mm)
     rim = cloud_rim(scan.points_mm, tree) if scan.faces is None else mesh_rim(scan.points_mm, scan.faces)
     return ScanSurface(scan.points_mm, tree, rim, _spacing_mm(scan.points_mm, tree), scan.normals, scan.faces)
+
+
+def _without_copies(scan: Scan) -> Scan:
+    _, first = np.unique(scan.points_mm, axis=0, return_index=True)
+    if len(first) == len(scan.points_mm):
+        return scan
+    first = np.sort(first)
+    return Scan(scan.points_mm[first], None if scan.normals is None else scan.normals[first], None, scan.source)
 
 
 def _spacing_mm(points_mm: FloatArray, tree: cKDTree) -> float:

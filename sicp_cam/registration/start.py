@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from sicp_cam.contour.frames import FramedCurve, at, moved
 from sicp_cam.contour.loops import mesh_loops, resampled, rim_loops
@@ -20,9 +21,9 @@ from sicp_cam.errors import AmbiguousPoseError, RegistrationError
 from sicp_cam.model import FloatArray
 from sicp_cam.registration.rigid import NominalContour, register_rigidly
 from sicp_cam.registration.scan_surface import ScanSurface, distances_along_normal
-from sicp_cam.rigid_motion import apply, best_fit, rotate
+from sicp_cam.rigid_motion import apply, best_fit, from_parts, rotate
 
-__all__ = ["Start", "find_start", "is_circular", "is_symmetric", "scan_loops", "signature_poses"]
+__all__ = ["Start", "find_start", "is_circular", "is_symmetric", "scan_loops", "side_ratio", "signature_poses"]
 
 SIGNATURE_POINTS = 256
 LENGTH_TOLERANCE = 0.2
@@ -169,8 +170,8 @@ def _refined(
         return None
     if _outward_agreement(contours, surface, pose.T_scan_part) < 0.0:
         return None  # the scan's own normals say that this is the other side
-    misfit = _surface_misfit(contours, surface, pose.T_scan_part, reach_mm)
-    return (float(np.hypot(misfit, pose.rms_mm)), pose.T_scan_part) if np.isfinite(misfit) else None
+    misfit = _misfit(contours, surface, pose.T_scan_part, reach_mm)
+    return (misfit, pose.T_scan_part) if np.isfinite(misfit) else None
 
 
 def _outward_agreement(contours: Sequence[NominalContour], surface: ScanSurface, T: FloatArray) -> float:
@@ -183,17 +184,60 @@ def _outward_agreement(contours: Sequence[NominalContour], surface: ScanSurface,
     return float(np.sum(surface.normals[index] * rotate(T, normals), axis=1).mean()) if len(points) else 0.0
 
 
-def _surface_misfit(contours: Sequence[NominalContour], surface: ScanSurface, T: FloatArray, reach_mm: float) -> float:
-    """Return the RMS distance of stability points from the scan; one without surface counts a quarter of the reach."""
+def _misfit(contours: Sequence[NominalContour], surface: ScanSurface, T: FloatArray, reach_mm: float) -> float:
+    """Return the RMS distance of stability points from the scan's surface, and of contour points from its rim.
+
+    What finds nothing counts a quarter of the reach, so that an opening that the scan does not have speaks against a
+    pose; infinite where most stability points find no surface.
+    """
+    missing_mm = 0.25 * reach_mm
     points = np.concatenate([contour.ring_points_mm for contour in contours])
     normals = np.concatenate([contour.ring_normals for contour in contours])
-    if not len(points):
-        return 0.0
-    distances, _ = distances_along_normal(surface, apply(T, points), rotate(T, normals), reach_mm)
-    missing = np.isnan(distances)
-    if missing.mean() > 0.5:
+    out = np.zeros(1)
+    if len(points):
+        out, _ = distances_along_normal(surface, apply(T, points), rotate(T, normals), reach_mm)
+        if np.isnan(out).mean() > 0.5:
+            return float("inf")
+        out = np.where(np.isnan(out), missing_mm, np.clip(out, -missing_mm, missing_mm))
+    if not len(surface.rim.points_mm):
         return float("inf")
-    return float(np.sqrt(np.mean(np.where(missing, 0.25 * reach_mm, distances) ** 2)))
+    stations = [at(c.curve, np.linspace(0.0, c.curve.length_mm, SIGNATURE_POINTS, endpoint=False)) for c in contours]
+    edge = np.concatenate([apply(T, station.points_mm) for station in stations])
+    across, _ = cKDTree(surface.rim.points_mm).query(edge)
+    return float(np.sqrt(np.mean(out**2) + np.mean(np.minimum(across, missing_mm) ** 2)))
+
+
+def side_ratio(
+    contours: Sequence[NominalContour], surface: ScanSurface, T_scan_part: FloatArray, *, reach_mm: float
+) -> float:
+    """Compare a given pose with the part turned over about the two axes in its contour's plane.
+
+    The outward side of a scan of a thin sheet is not in its points. A fixture's pose decides it; but a pose typed with
+    a wrong sign puts the tool on the wrong side of the part, and where the part is curved, the curvature tells.
+
+    Returns
+    -------
+    float
+        Misfit of the pose over that of the better turned-over one: well below 1 where the side is right.
+
+    Raises
+    ------
+    AmbiguousPoseError
+        If the scan's own normals point to the other side.
+    """
+    if _outward_agreement(contours, surface, T_scan_part) < 0.0:
+        raise AmbiguousPoseError(
+            "the normals of the scan point to the inner side of the part, as the start pose has it;"
+            " turn the pose over in --align FILE, or the normals in the scan"
+        )
+    points = np.concatenate([moved(contour.curve, T_scan_part).points_mm for contour in contours])
+    centre = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - centre, full_matrices=False)
+    turned = [2.0 * np.outer(axis, axis) - np.eye(3) for axis in axes[:2]]
+    over = [from_parts(R, centre - R @ centre) @ T_scan_part for R in turned]
+    misfits = [refined[0] for T in over if (refined := _refined(contours, surface, T, reach_mm))]
+    given = _misfit(contours, surface, T_scan_part, reach_mm)
+    return given / max(min(misfits), 1e-9) if misfits else 0.0
 
 
 def _clearest(refined: list[tuple[float, FloatArray]], curve: FramedCurve, circular: bool) -> Start:

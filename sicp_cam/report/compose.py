@@ -16,7 +16,7 @@ from sicp_cam.registration.result import Registration
 from sicp_cam.report import result_tables
 from sicp_cam.report.deviation import out_of_surface
 from sicp_cam.report.document import Picture, ReportDocument
-from sicp_cam.report.figures import correction_along_contour, error_along_contour
+from sicp_cam.report.figures import SEGMENT_STEPS, correction_along_contour, error_along_contour
 from sicp_cam.report.path_view import largest_correction, paths_scene
 from sicp_cam.report.scenes import Scene, render
 from sicp_cam.report.views import deviation_scene, sample, subdivision_scene
@@ -32,19 +32,22 @@ PICTURES_FAILED = 701
 _REACH_MM = 150.0
 _TITLE = "Tool path correction report"
 _SIGNS = (
-    "normal: positive = the scan edge lies further into the material than the contour; negative = material stands "
-    "beyond the contour. out: positive = the scan surface lies outside of (above) the nominal surface; negative = it "
-    "lies inside (sags below). both: distance across the contour, the root of normal² + out².",
-    "All in mm, on the stretches that the scan shows. mean and sd keep the sign; p95 and max are of the size. Sliding "
-    "along the contour does not change the part and is not counted.",
+    "normal (across the edge, in the surface): positive = into the material, the scan edge lies further in than the "
+    "contour; negative = material stands beyond the contour.",
+    "out (of the surface): positive = outward, the scan surface lies above the contour; negative = it sags below.",
+    "both = sqrt(normal² + out²): the distance across the contour. Sliding along the contour does not change the part "
+    "and is not counted.",
+    "All in mm, on the stretches that the scan shows. mean and sd keep the sign; p95 and max are of the size.",
 )
 _CAPTIONS = {
-    "error": "distance between scan and contour along the contour, after the rigid registration and after correction.",
-    "deviation": "Scan points on the rigidly registered part, coloured by how far they lie out of its surface.",
+    "error": f"distance between scan and contour along the contour. {result_tables.FIT} "
+    "Where a curve is missing, nothing was measured.",
+    "deviation": "Scan points on the rigidly registered part, coloured by how far they lie out (of the surface).",
     "subdivision": "segments, subdivision points and stability points on the corrected contour.",
     "paths": "Nominal path, rigidly registered, and corrected path with tool axes; true to scale.",
     "paths_enlarged": "The same with the correction drawn larger than it is, by the factor in the picture's title.",
-    "correction": "what the correction adds to the rigid pose along the contour.",
+    "correction": "what the correction adds to the rigid pose along the contour. Ticks at the top are the borders of "
+    f"the segments. {SEGMENT_STEPS}",
 }
 """In the order in which the report shows them."""
 

@@ -42,7 +42,7 @@ def deviation_bar(deviation_mm: FloatArray, tolerance_mm: float) -> ColourBar:
         (*_BELOW[1:], _NEUTRAL, *_ABOVE[:-1]),
         _BELOW[0],
         _ABOVE[-1],
-        "out of the nominal surface / mm",
+        "out (of the surface) / mm, + outward",
     )
 
 

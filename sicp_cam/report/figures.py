@@ -15,21 +15,28 @@ from matplotlib.patches import Patch
 from sicp_cam.model import FloatArray
 from sicp_cam.registration.result import RegisteredContour
 from sicp_cam.report.lettering import STYLE, png
-from sicp_cam.report.result_tables import METHODS
+from sicp_cam.report.result_tables import FIT, METHODS
 from sicp_cam.report.statistics import both
 from sicp_cam.report.stretches import clipped, marked
 
-__all__ = ["correction_along_contour", "error_along_contour"]
+__all__ = ["SEGMENT_STEPS", "correction_along_contour", "error_along_contour"]
+
+SEGMENT_STEPS = (
+    "Each segment moves as one rigid body and goes over to the next at their border: steps or a sawtooth with the "
+    "spacing of the ticks are these changes."
+)
+"""What the steps of the correction are; true for a contour without segments too, which has neither."""
 
 BEFORE, AFTER, GAP = "#c8782c", "#1f4fa3", "#f3d9dc"
 INTO, OUT, TURN = "#2f7d4f", "#7a3f98", "#444444"
+NORMAL, OUT_OF = "normal (across the edge)", "out (of the surface)"
 
 
 def error_along_contour(contour: RegisteredContour, method: str, tolerance_mm: float | None = None) -> bytes:
-    """Return the PNG of the registration error over arc length, rigid against the method (the paper's figure 10).
+    """Return the PNG of the residuals over arc length, rigid against the method (the paper's figure 10).
 
-    Three panels: the distance across the contour, then its parts in the surface and out of it. Stretches that the scan
-    does not show are shaded and have no curve; subdivision points are ticks at the top.
+    Three panels: the distance across the contour, then its parts across the edge and out of the surface. Stretches that
+    the scan does not show are shaded and have no curve; subdivision points are ticks at the top.
 
     Parameters
     ----------
@@ -41,9 +48,9 @@ def error_along_contour(contour: RegisteredContour, method: str, tolerance_mm: f
         Drawn as a dashed line, if given.
     """
     titles = (
-        "distance across the contour / mm",
-        "normal: + into the material / mm",
-        "out of the surface: + outward / mm",
+        "both = sqrt(normal² + out²)\n/ mm",
+        f"{NORMAL}\n+ into the material / mm",
+        f"{OUT_OF}\n+ outward / mm",
     )
     before = (both(contour.before), contour.before.normal_mm, contour.before.out_mm)
     after = (both(contour.after), contour.after.normal_mm, contour.after.out_mm)
@@ -58,11 +65,11 @@ def error_along_contour(contour: RegisteredContour, method: str, tolerance_mm: f
         axes[0].set_ylim(bottom=0.0)
 
     keys = [("rigid ICP", BEFORE)] + ([(METHODS.get(method, method), AFTER)] if method != "rigid" else [])
-    return _figure(f"Contour {contour.number}: registration error along the contour", contour, 3, draw, keys)
+    return _figure(f"Contour {contour.number}: distance to the scan along the contour", contour, 3, draw, keys, FIT)
 
 
 def correction_along_contour(contour: RegisteredContour) -> bytes:
-    """Return the PNG of the correction beyond the rigid pose over arc length: shift inward and outward, and turn."""
+    """Return the PNG of the correction beyond the rigid pose over arc length: shift along normal and out, and turn."""
     shift = contour.corrected.points_mm - contour.rigid.points_mm
     into = np.sum(shift * contour.rigid.inward, axis=1)
     out = np.sum(shift * contour.rigid.outward, axis=1)
@@ -74,16 +81,16 @@ def correction_along_contour(contour: RegisteredContour) -> bytes:
         _curve(axes[0], contour, out, OUT)
         axes[0].set_ylabel("shift / mm")
         _curve(axes[1], contour, turn, TURN)
-        axes[1].set_ylabel("turn of the outward normal / deg")
+        axes[1].set_ylabel("turn of the direction out / deg")
         axes[1].set_ylim(bottom=0.0)
 
     keys = [
-        ("into the material (normal)", INTO),
-        ("outward (out)", OUT),
-        ("turn of the outward normal", TURN),
+        (f"{NORMAL}, + into the material", INTO),
+        (f"{OUT_OF}, + outward", OUT),
+        ("turn of the direction out", TURN),
     ]
     title = f"Contour {contour.number}: correction of the path beyond the rigid pose"
-    return _figure(title, contour, 2, draw, keys)
+    return _figure(title, contour, 2, draw, keys, SEGMENT_STEPS if len(contour.split_s_mm) else "")
 
 
 def _figure(
@@ -92,10 +99,11 @@ def _figure(
     panels: int,
     draw: Callable[[list[Axes]], None],
     keys: list[tuple[str, str]],
+    note: str,
 ) -> bytes:
     with matplotlib.style.context(list(STYLE)):
         figure = Figure(
-            figsize=(16, 2.6 + 2.8 * panels),
+            figsize=(16, 2.9 + 2.8 * panels),
             dpi=100,
             facecolor="white",
             layout=ConstrainedLayoutEngine(w_pad=0.15, h_pad=0.08),
@@ -111,7 +119,16 @@ def _figure(
         handles = [Patch(color=colour, label=text) for text, colour in keys]
         if gaps:
             handles.append(Patch(color=GAP, label="not seen by the scan"))
-        figure.legend(handles=handles, loc="outside lower left", ncols=4, frameon=False, fontsize=13)
+        figure.legend(
+            handles=handles,
+            loc="outside lower left",
+            ncols=4,
+            frameon=False,
+            fontsize=13,
+            title=note,
+            title_fontsize=12,
+            alignment="left",
+        )
         return png(canvas)
 
 

@@ -31,7 +31,7 @@ _FOOT_PX = 112
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """An entry of the legend: a line (marker "-") or a matplotlib marker in a colour."""
+    """An entry of the legend: a line (marker "-"), a dotted line (":") or a matplotlib marker in a colour."""
 
     text: str
     colour: str
@@ -103,8 +103,8 @@ def _legend(figure: Figure, keys: Sequence[Key], beside_colour_bar: bool) -> Non
     if not keys:
         return
     handles = [
-        Line2D([], [], color=k.colour, lw=5, label=literal(k.text, 60))
-        if k.marker == "-"
+        Line2D([], [], color=k.colour, lw=5, ls=k.marker, label=literal(k.text, 60))
+        if k.marker in ("-", ":")
         else Line2D([], [], color=k.colour, marker=k.marker, ms=12, ls="none", label=literal(k.text, 60))
         for k in keys
     ]

@@ -6,18 +6,21 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
+from matplotlib.colors import to_rgb
 
 from sicp_cam.model import BoolArray, FloatArray, ToolPath, TriangleMesh
 from sicp_cam.registration.result import Registration
 from sicp_cam.report.camera import Camera, pixels
 from sicp_cam.report.lettering import Key, Lettering
-from sicp_cam.report.scenes import Arrows, Layer, Line, Scene, Surface
+from sicp_cam.report.scenes import Arrows, Dots, Layer, Line, Scene, Surface
 from sicp_cam.report.views import PART, camera_on
 
 __all__ = ["largest_correction", "paths_scene"]
 
-RIGID, CORRECTED, RAPID = "#d0761f", "#1f4fa3", "#8f8f8f"
+RIGID, CORRECTED, RAPID = "#d0761f", "#1f4fa3", "#c2189b"
+_RAPID_RGB = np.round(255.0 * np.array(to_rgb(RAPID))).astype(np.uint8)
 _SHOWN_ARROWS = 44
+_DOT_EVERY_PX, _MOST_DOTS = 13.0, 50_000
 
 
 def paths_scene(
@@ -28,6 +31,9 @@ def paths_scene(
     exaggeration: float = 1.0,
 ) -> Scene:
     """Return the picture of the nominal (rigidly registered) and the corrected path with tool axes (figure 11).
+
+    All feed moves are in view. Rapid moves of the corrected path are dotted as far as they are in view; a rapid move
+    at the very beginning comes from a place that the path does not say, and is not drawn.
 
     Parameters
     ----------
@@ -40,7 +46,7 @@ def paths_scene(
     if exaggeration != 1.0:
         tips = path_rigid.tips_mm + exaggeration * (tips - path_rigid.tips_mm)
     drawn = ((path_rigid, path_rigid.tips_mm, RIGID, 2.5), (path_corrected, tips, CORRECTED, 3.5))
-    seen = np.concatenate([*(places[~path.rapid] for path, places, _, _ in drawn), *(c.points_mm for c in curves)])
+    seen = np.concatenate([*(places[_fed(path.rapid)] for path, places, _, _ in drawn), *(c.points_mm for c in curves)])
     length = 0.07 * float(np.linalg.norm(np.ptp(seen, axis=0)))
     heads = [(places + length * path.axes)[~path.rapid] for path, places, _, _ in drawn]
     camera = camera_on(np.concatenate([seen, *heads]), registration, tilt_deg=50.0)
@@ -48,15 +54,19 @@ def paths_scene(
     lift = camera.mm_per_px * 6 + 3.0 * exaggeration * min(largest_correction(path_rigid, path_corrected), length)
     layers: list[Layer] = [Surface(mesh_scan_frame, PART)]
     for path, places, colour, width in drawn:
-        for rapid, run in _runs(places, path.rapid):
-            layers.append(Line(_thinned(run, camera), RAPID if rapid else colour, 1.5 if rapid else width, lift))
+        feeds = _runs(places, path.rapid, rapid=False)
+        layers += [Line(_thinned(run, camera), colour, width, lift) for run in feeds]
         cut = np.flatnonzero(~path.rapid)
         chosen = cut[np.unique(np.linspace(0, len(cut) - 1, min(_SHOWN_ARROWS, len(cut))).astype(np.int64))]
         layers.append(Arrows(places[chosen], path.axes[chosen], length, colour, lift))
         lift += camera.mm_per_px * 4
     keys = [Key("nominal path, rigidly registered", RIGID), Key("corrected path", CORRECTED)]
-    if path_rigid.rapid.any() or path_corrected.rapid.any():
-        keys.append(Key("rapid moves", RAPID))
+    dots = [_dotted(run, camera) for run in _runs(tips, path_corrected.rapid, rapid=True)]
+    rapids = np.concatenate([np.zeros((0, 3)), *dots])
+    if len(rapids):
+        lift += camera.mm_per_px * 8  # over the feed moves: in and out are often the same line
+        layers.append(Dots(rapids, np.tile(_RAPID_RGB, (len(rapids), 1)), 6.0, lift, True))
+        keys.append(Key("rapid moves, corrected path", RAPID, ":"))
     larger = "" if exaggeration == 1.0 else f", correction drawn {exaggeration:g} times larger"
     scale = "true to scale" if exaggeration == 1.0 else "positions of the corrected path are NOT true to scale"
     words = Lettering(
@@ -75,12 +85,33 @@ def largest_correction(path_rigid: ToolPath, path_corrected: ToolPath) -> float:
     return float(np.max(shift[~path_rigid.rapid], initial=0.0))
 
 
-def _runs(tips: FloatArray, rapid: BoolArray) -> Iterable[tuple[bool, FloatArray]]:
-    """Yield the path in pieces of rapid and of cutting moves, each from where the piece before it ended."""
-    borders = [0, *(np.flatnonzero(rapid[1:] != rapid[:-1]) + 1).tolist(), len(tips)]
+def _fed(rapid: BoolArray) -> BoolArray:
+    """Mark the ends and the starts of the feed moves."""
+    fed = ~rapid
+    fed[:-1] |= ~rapid[1:]
+    return fed
+
+
+def _runs(tips: FloatArray, among: BoolArray, *, rapid: bool) -> Iterable[FloatArray]:
+    """Yield the pieces of rapid or of feed moves, each from where the piece before it ended."""
+    borders = [0, *(np.flatnonzero(among[1:] != among[:-1]) + 1).tolist(), len(tips)]
     for start, end in pairwise(borders):
-        if end > start:
-            yield bool(rapid[start]), tips[max(start - 1, 0) : end]
+        if end > start and among[start] == rapid:
+            yield tips[max(start - 1, 0) : end]
+
+
+def _dotted(tips: FloatArray, camera: Camera) -> FloatArray:
+    """Return (n, 3) points along a polyline, equally far apart in the picture, as far as they lie in it."""
+    across = np.linalg.norm(np.diff(pixels(camera, tips), axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(across)])
+    if not np.ptp(tips, axis=0).any():
+        return np.zeros((0, 3))
+    count = min(max(2, int(along[-1] / _DOT_EVERY_PX)), _MOST_DOTS)
+    wanted = np.linspace(0.0, along[-1], count)
+    dots = np.stack([np.interp(wanted, along, tips[:, axis]) for axis in range(3)], axis=1)
+    placed = pixels(camera, dots)
+    inside: FloatArray = dots[np.all((placed >= 0.0) & (placed <= [camera.width_px, camera.height_px]), axis=1)]
+    return inside
 
 
 def _thinned(tips: FloatArray, camera: Camera) -> FloatArray:

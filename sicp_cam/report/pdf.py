@@ -123,7 +123,8 @@ def _table(table: Table) -> list[Flowable]:
         )
     )
     left_out = len(table.rows) - len(shown)
-    notes = [f"{left_out} further rows are not printed; result.json has them all."] if left_out else []
+    rows_are = "row is" if left_out == 1 else "rows are"
+    notes = [f"{left_out} further {rows_are} not printed; result.json has them all."] if left_out else []
     return [*heading, laid_out, Spacer(1, 1 * mm), *(_text(note, 8) for note in [*notes, table.note] if note)]
 
 

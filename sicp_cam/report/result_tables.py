@@ -7,6 +7,7 @@ wrong type is an error that names the key.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any
@@ -14,10 +15,21 @@ from typing import Any
 from sicp_cam.errors import ReportError
 from sicp_cam.report.document import Table, Verdict
 
-__all__ = ["METHODS", "details", "findings", "gates", "inputs", "statistics", "verdict"]
+__all__ = ["FIT", "METHODS", "details", "findings", "gates", "inputs", "statistics", "verdict"]
 
-METHODS = {"sicp": "S-ICP", "paper": "S-ICP as published", "rigid": "rigid ICP", "projection": "projection"}
+METHODS = {
+    "sicp": "S-ICP (sicp)",
+    "paper": "S-ICP as published (paper)",
+    "rigid": "rigid ICP",
+    "projection": "projection",
+}
 """How the methods are called in reports."""
+
+FIT = "Distance to the measured edge and surface: how well the curve fits the scan, not how true it is."
+"""What a residual can not say, printed wherever residuals are shown."""
+
+_GATE_OVERRIDDEN = 501
+"""Code of the finding that repeats an overridden gate."""
 
 _SEVERITY = {"ok": 0, "info": 0, "warn": 1, "overridden": 1, "fail": 2}
 _VERDICTS = (Verdict.OK, Verdict.WARNINGS, Verdict.FAILED)
@@ -34,6 +46,7 @@ def verdict(result: Mapping[str, Any]) -> tuple[Verdict, tuple[str, ...]]:
         If a status, state or level is none of those that the schema knows.
     """
     reasons = []
+    told: dict[str, list[str]] = {}
     worst = _severity("status", result.get("status"))
     for gate in _rows(result, "gates"):
         severity = _severity("gates.state", gate.get("state"))
@@ -44,10 +57,10 @@ def verdict(result: Mapping[str, Any]) -> tuple[Verdict, tuple[str, ...]]:
         worst = max(worst, severity)
     for finding in _rows(result, "findings"):
         severity = _severity("findings.level", finding.get("level"))
-        if severity:
-            where = f" ({finding['where']})" if finding.get("where") else ""
-            reasons.append(f"{_text(finding.get('message'))}{where}")
+        if severity and not _repeats_a_gate(finding, result):
+            told.setdefault(_text(finding.get("message")), []).append(_text(finding.get("where"), ""))
         worst = max(worst, severity)
+    reasons += [message + _places(message, places) for message, places in told.items()]
     if not reasons:
         word = ("All gates passed; no warnings.", "The run ended with a warning.", "The run failed.")[worst]
         reasons.append(word)
@@ -77,16 +90,19 @@ def statistics(result: Mapping[str, Any]) -> Table:
     """Return the residuals of the scan, rigid against the method, and how much of the contours was seen."""
     registration = _section(result, "registration")
     method = METHODS.get(_text(registration.get("method")), _text(registration.get("method")))
+    shown = [("rigid", METHODS["rigid"]), ("corrected", method)]
+    if method == METHODS["rigid"] and registration.get("corrected") == registration.get("rigid"):
+        shown = shown[:1]
     rows = tuple(
         (name, part, *(_number(_section(_section(registration, key), part).get(n), 3) for n in _NUMBERS))
-        for key, name in (("rigid", "rigid ICP"), ("corrected", method))
+        for key, name in shown
         for part in ("normal", "out", "both")
     )
     coverage = ", ".join(
         f"contour {_text(contour.get('id'))}: {_percent(contour.get('coverage'))}"
         for contour in _rows(registration, "contours")
     )
-    note = f"Coverage, the share of the contour that the scan shows: {coverage or '-'}."
+    note = f"{FIT} Coverage, the share of the contour that the scan shows: {coverage or '-'}."
     head = ("registration", "residual / mm", *_NUMBERS)
     return Table("Residuals of the scan", head, rows, (4, 3, 2, 2, 2, 2, 2), numeric=2, note=note)
 
@@ -99,13 +115,16 @@ def details(result: Mapping[str, Any]) -> Table:
     rows = [("method", METHODS.get(_text(registration.get("method")), _text(registration.get("method"))))]
     for contour in _rows(registration, "contours"):
         symmetric = "; symmetric, its start is free" if contour.get("symmetric") else ""
-        length, segments = _number(contour.get("length_mm"), 1), _text(contour.get("segments"))
-        rows.append((f"contour {_text(contour.get('id'))}", f"{length} mm long, {segments} segments{symmetric}"))
+        length, segments = _number(contour.get("length_mm"), 1), _segments(contour.get("segments"))
+        rows.append((f"contour {_text(contour.get('id'))}", f"{length} mm long, {segments}{symmetric}"))
+    rows.append(("point spacing / noise of the scan", _units(registration, ("spacing_mm", "noise_mm"), "mm")))
+    if _stated(leave_out):
+        rows.append(("left-out points, rms: normal / out", _units(_rms(leave_out), ("normal", "out"), "mm")))
+    if _stated(uncertainty):
+        rows.append(("uncertainty: mean / max", _units(uncertainty, ("mean_mm", "max_mm"), "mm")))
     rows += [
-        ("point spacing / noise of the scan", _units(registration, ("spacing_mm", "noise_mm"), "mm")),
-        ("left-out points, rms: normal / out", _units(_rms(leave_out), ("normal", "out"), "mm")),
-        ("uncertainty: mean / max", _units(uncertainty, ("mean_mm", "max_mm"), "mm")),
-        ("largest correction / jump", _units(correction, ("max_mm", "max_jump_mm"), "mm")),
+        ("largest correction", _units(correction, ("max_mm",), "mm")),
+        ("largest step of the correction between neighbouring moves", _units(correction, ("max_jump_mm",), "mm")),
         ("largest turn of the tool axis", _units(correction, ("max_axis_deg",), "deg")),
         ("freedoms of the rigid pose (1 firm, 0 free)", _list(registration.get("freedoms"), "registration.freedoms")),
     ]
@@ -118,12 +137,19 @@ def details(result: Mapping[str, Any]) -> Table:
 
 
 def gates(result: Mapping[str, Any]) -> Table:
-    """Return the table of gates."""
+    """Return the table of gates, each with what its value is and its unit, as the document says them."""
     rows = tuple(
-        (_text(g.get("name")), _number(g.get("value")), _number(g.get("limit")), _text(g.get("state")).upper())
-        for g in _rows(result, "gates")
+        (
+            _text(gate.get("name")),
+            _text(gate.get("text")),
+            _number(gate.get("value")),
+            _number(gate.get("limit")),
+            _text(gate.get("state")).upper(),
+        )
+        for gate in _rows(result, "gates")
     )
-    return Table("Gates", ("gate", "value", "limit", "state"), rows, (5, 2, 2, 2), numeric=1)
+    head = ("gate", "what it looks at", "value", "limit", "state")
+    return Table("Gates", head, rows, (3, 7.4, 1.6, 1.2, 2.2), numeric=2)
 
 
 def findings(result: Mapping[str, Any]) -> Table:
@@ -135,6 +161,30 @@ def findings(result: Mapping[str, Any]) -> Table:
     )
     note = "" if rows else "None."
     return Table("Findings", ("level", "code", "what", "where"), rows, (1.2, 1, 9, 4), note=note)
+
+
+def _repeats_a_gate(finding: Mapping[str, Any], result: Mapping[str, Any]) -> bool:
+    """Say whether an overridden gate is told by this finding, which the gate itself tells already."""
+    if finding.get("code") != _GATE_OVERRIDDEN:
+        return False
+    names = [gate.get("name") for gate in _rows(result, "gates") if _word(gate.get("state")) == "overridden"]
+    return any(f"gate {name} " in _text(finding.get("message")) for name in names)
+
+
+def _places(message: str, places: Sequence[str]) -> str:
+    """Return the places of a message in brackets, each once, without those that the message names itself."""
+    missing = [place for place in dict.fromkeys(places) if place and not _names(message, place)]
+    return f" ({', '.join(missing)})" if missing else ""
+
+
+def _names(message: str, place: str) -> bool:
+    return re.search(rf"(?<!\w){re.escape(place)}(?!\w)", message) is not None
+
+
+def _segments(count: object) -> str:
+    if count == 0:
+        return "one rigid motion"
+    return f"{_text(count)} segment{'' if count == 1 else 's'}"
 
 
 def _severity(key: str, value: object) -> int:
@@ -168,6 +218,10 @@ def _sequence(value: Any, key: str) -> Sequence[Any]:
     if isinstance(value, str) or not isinstance(value, Sequence):
         raise ReportError(f"result: '{key}' must be a list, not {type(value).__name__}; repeat the run")
     return value
+
+
+def _stated(section: Mapping[str, Any]) -> bool:
+    return any(value is not None for value in section.values())
 
 
 def _rms(section: Mapping[str, Any]) -> dict[str, Any]:

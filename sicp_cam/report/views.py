@@ -67,7 +67,7 @@ def deviation_scene(
     few = f"; {len(points):,} of the scan's {scan_points:,} points drawn" if len(points) < scan_points else ""
     words = Lettering(
         "Scan against the rigidly registered part",
-        f"positive: the scan lies outside of the nominal surface; within ±{tolerance_mm:g} mm: one colour{few}",
+        f"out (of the surface), + outward; within ±{tolerance_mm:g} mm: one colour{few}",
         tuple(keys),
         bar,
     )
@@ -98,9 +98,10 @@ def subdivision_scene(contour: RegisteredContour, registration: Registration) ->
     if gaps:
         keys.append(Key("not seen by the scan", GAP))
     many = f"{count} segments" if count > 1 else "one rigid motion"
+    stability = len(contour.stability_scan_mm)
     words = Lettering(
         f"Contour {contour.number}: subdivision",
-        f"{many}, {len(contour.stability_scan_mm)} stability points, length {curve.length_mm:.1f} mm",
+        f"{many}, {stability} stability point{'' if stability == 1 else 's'}, length {curve.length_mm:.1f} mm",
         tuple(keys),
     )
     return Scene(tuple(layers), camera, words)

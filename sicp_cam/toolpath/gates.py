@@ -9,7 +9,7 @@ import numpy as np
 
 from sicp_cam.contour.frames import FramedCurve
 from sicp_cam.model import BoolArray, FloatArray, Status
-from sicp_cam.registration.result import RegisteredContour
+from sicp_cam.registration.result import RegisteredContour, Registration
 from sicp_cam.toolpath.settings import GateLimits
 from sicp_cam.toolpath.transfer import CorrectedPath
 
@@ -46,7 +46,9 @@ GATE_NAMES = (
     "coverage",
     "residual_mm",
     "edge_residual_mm",
+    "side",
     "stretch",
+    "in_surface_mm",
     "path_distance_mm",
     "correction_mm",
     "axis_deg",
@@ -54,17 +56,26 @@ GATE_NAMES = (
 )
 
 
-def registration_gates(contours: Sequence[RegisteredContour], limits: GateLimits) -> tuple[Gate, ...]:
+def registration_gates(registration: Registration, limits: GateLimits) -> tuple[Gate, ...]:
     """Judge the registration: how much of the contour was seen, how well it fits, and that it was not stretched."""
+    contours = registration.contours
     coverage = min(float(contour.covered.mean()) for contour in contours)
     out = max(_mean_size(contour.after.out_mm) for contour in contours)
     normal = max(_mean_size(contour.after.normal_mm) for contour in contours)
     stretch = max(abs(_length(contour.corrected) / _length(contour.nominal) - 1.0) for contour in contours)
+    aside = max(_largest_aside(contour) for contour in contours)
     return (
         _at_least("coverage", coverage, limits.coverage, "fraction of the contour on which the scan shows the edge"),
         _at_most("residual_mm", out, limits.residual_mm, "mean distance of scan and contour out of the surface, mm"),
         _at_most("edge_residual_mm", normal, limits.edge_residual_mm, "mean distance of scan edge and contour, mm"),
+        _at_most(
+            "side",
+            registration.side or 0.0,
+            limits.side,
+            "misfit of the given pose over that of the part turned over; is the other side outward?",
+        ),
         _at_most("stretch", stretch, limits.stretch, "relative change of the contour's length"),
+        _at_most("in_surface_mm", aside, limits.in_surface_mm, "largest move of the edge in the surface, mm"),
     )
 
 
@@ -104,7 +115,7 @@ def path_gates(corrected: CorrectedPath, distance_mm: FloatArray, limits: GateLi
             "jump_mm",
             _largest_jump(change, corrected.nominal.tips_mm, cuts),
             limits.jump_mm,
-            "largest step of the correction between neighbouring points, mm",
+            f"largest step of the correction between neighbouring points beyond {SLOPE:g} mm per mm of path, mm",
         ),
     )
 
@@ -123,6 +134,11 @@ def _at_most(name: str, value: float, limit: float, text: str) -> Gate:
 
 def _at_least(name: str, value: float, limit: float, text: str) -> Gate:
     return Gate(name, value, limit, "ok" if value >= limit else "fail", text)
+
+
+def _largest_aside(contour: RegisteredContour) -> float:
+    change = contour.corrected.points_mm - contour.rigid.points_mm
+    return float(np.abs(np.sum(change * contour.rigid.inward, axis=1)).max())
 
 
 def _mean_size(values: FloatArray) -> float:

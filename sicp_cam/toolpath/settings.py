@@ -46,8 +46,12 @@ class GateLimits:
         Largest mean distance between scan and corrected contour, out of the surface.
     edge_residual_mm
         Largest mean distance between scan edge and corrected contour, in the surface.
+    side
+        Largest misfit of a given pose over that of the part turned over; above 1 the other side fits better.
     stretch
         Largest relative change of the contour's length; a part that bends keeps it.
+    in_surface_mm
+        Largest move of the edge within the surface, beyond the rigid pose; a part that bends hardly has any.
     correction_mm
         Largest move of a point by the deformation, beyond the rigid pose.
     axis_deg
@@ -60,7 +64,9 @@ class GateLimits:
     coverage: float = 0.5
     residual_mm: float = 0.5
     edge_residual_mm: float = 3.0
+    side: float = 2.0
     stretch: float = 0.02
+    in_surface_mm: float = 6.0
     correction_mm: float = 30.0
     axis_deg: float = 15.0
     jump_mm: float = 0.5

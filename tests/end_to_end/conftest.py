@@ -89,10 +89,12 @@ def parts_read_once():
 
     def read_once(path, **options):
         file = Path(path)
-        key = (file.resolve(), file.stat().st_mtime_ns, repr(options)) if file.exists() else None
-        if key is None or key not in known:
-            part = read(path, **options)
-            known[key] = part
+        if not file.exists():
+            return read(path, **options)
+        stated = tuple(sorted((name, repr(value)) for name, value in options.items() if value))
+        key = (file.resolve(), file.stat().st_mtime_ns, stated)
+        if key not in known:
+            known[key] = read(path, **options)
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:

@@ -170,10 +170,10 @@ def test_the_scan_of_another_part_clamped_in_the_same_place_is_refused(refused, 
     refused(4, *bench.words("porthole", tmp_path / "out", scan=file))
 
 
-def test_a_part_three_percent_smaller_is_refused(refused, bench, tmp_path):
+def test_a_part_three_percent_larger_is_refused(refused, bench, tmp_path):
     points = sicp_cam.read_scan(bench.SAMPLES / "porthole" / "scan.ply").points_mm
     centre = points.mean(axis=0)
-    file = as_text(tmp_path / "scan.xyz", (points - centre) * 0.97 + centre)
+    file = as_text(tmp_path / "scan.xyz", (points - centre) * 1.03 + centre)
     assert "stretch" in refused(4, *bench.words("porthole", tmp_path / "out", scan=file))
 
 

@@ -114,8 +114,20 @@ def result() -> dict[str, Any]:
         "uncertainty": {"mean_mm": 0.05, "max_mm": 0.2},
         "correction": {"max_mm": 3.0, "max_axis_deg": 1.5, "max_jump_mm": 0.01},
         "gates": [
-            {"name": "coverage", "value": 0.9045, "limit": 0.5, "state": "ok"},
-            {"name": "axis_deg", "value": 16.25, "limit": 15.0, "state": "overridden"},
+            {
+                "name": "coverage",
+                "value": 0.9045,
+                "limit": 0.5,
+                "state": "ok",
+                "text": "fraction of the contour on which the scan shows the edge",
+            },
+            {
+                "name": "axis_deg",
+                "value": 16.25,
+                "limit": 15.0,
+                "state": "overridden",
+                "text": "largest turn of the tool axis beyond the rigid pose, degrees",
+            },
         ],
         "timing_s": {"total": 1.0},
         "versions": {"sicp_cam": "0.1.0"},

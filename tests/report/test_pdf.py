@@ -36,8 +36,11 @@ def test_the_first_page_tells_the_whole_story(made: ReportDocument) -> None:
     for expected in ("porthole", "WARNINGS", "part.step", "a&b.ply", "abababababab", "1.234", "90.5 %", "OVERRIDDEN"):
         assert expected in text
     words = " ".join(text.split())
-    assert "normal: positive = the scan edge lies further into the material" in words
-    assert "out: positive = the scan surface lies outside of (above) the nominal surface" in words
+    assert "normal (across the edge, in the surface): positive = into the material" in words
+    assert "out (of the surface): positive = outward, the scan surface lies above the contour" in words
+    assert "both = sqrt(normal² + out²)" in words
+    assert "how well the curve fits the scan, not how true it is" in words
+    assert "largest turn of the tool axis beyond the rigid pose, degrees 16.25 15 OVERRIDDEN" in words
     assert "Gate axis_deg failed and was overridden: 16.25 against the limit 15." in words
     assert "two stretches are bridged" in words
 
@@ -99,12 +102,13 @@ def test_long_texts_wrap_and_long_tables_split(made: ReportDocument) -> None:
     assert all(page.count("where") >= 1 for page in found[1:3])
 
 
-def test_what_is_not_printed_is_counted(made: ReportDocument, monkeypatch) -> None:
+@pytest.mark.parametrize(("count", "told"), [(67, "7 further rows are not"), (61, "1 further row is not")])
+def test_what_is_not_printed_is_counted(made: ReportDocument, monkeypatch, count: int, told: str) -> None:
     assert pdf.MOST_ROWS == 5000
     monkeypatch.setattr(pdf, "MOST_ROWS", 60)
-    rows = tuple((str(n),) for n in range(67))
+    rows = tuple((str(n),) for n in range(count))
     found = pages(build(replace(made, tables=(Table("t", ("n",), rows, (1,)),), pictures=())))
-    assert any("7 further rows are not printed" in page for page in found[-2:])
+    assert any(f"{told} printed" in page for page in found[-2:])
 
 
 @pytest.mark.parametrize("png", [b"", b"not a picture", b"\x89PNG\r\n\x1a\n" + b"\x00" * 40])

@@ -6,6 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from sicp_cam.model import ToolPath
+from sicp_cam.report.camera import pixels
 from sicp_cam.report.path_view import largest_correction, paths_scene
 from sicp_cam.report.scenes import Arrows, Dots, Line
 from sicp_cam.report.views import SHOWN_POINTS, deviation_scene, sample, subdivision_scene
@@ -57,12 +59,68 @@ def test_arrows_stand_on_cutting_moves_only_and_are_few(job) -> None:
     assert largest_correction(job.path_rigid, job.path_corrected) == pytest.approx(3.0, abs=1e-6)
 
 
-def test_all_cutting_moves_are_drawn(job) -> None:
+def test_all_cutting_moves_are_drawn_and_in_view(job) -> None:
     scene = paths_scene(job.mesh, job.path_rigid, job.path_corrected, job.registration)
     drawn = np.vstack([layer.points_mm for layer in scene.layers if isinstance(layer, Line)])
     for path in (job.path_rigid, job.path_corrected):
-        far = [np.linalg.norm(drawn - tip, axis=1).min() for tip in path.tips_mm]
-        assert max(far) < 2.0 * scene.camera.mm_per_px
+        fed = path.tips_mm[:-1]  # with the start of the first feed move
+        assert max(np.linalg.norm(drawn - tip, axis=1).min() for tip in fed) < 2.0 * scene.camera.mm_per_px
+        placed = pixels(scene.camera, fed)
+        assert ((placed > 0) & (placed < [1600, 900])).all()
+
+
+def rapid_dots(scene) -> np.ndarray:
+    dots = [layer.points_mm for layer in scene.layers if isinstance(layer, Dots)]
+    assert (len(dots) == 1) == any("rapid" in key.text for key in scene.lettering.keys)
+    return np.vstack([np.zeros((0, 3)), *dots])
+
+
+def with_moves(path: ToolPath, tips: np.ndarray, rapid: list[bool]) -> ToolPath:
+    count = len(tips)
+    axes = np.tile(path.axes[0], (count, 1))
+    return ToolPath(tips, axes, np.where(rapid, 0.0, 1200.0), np.array(rapid), np.arange(count))
+
+
+def test_rapid_moves_are_dotted_from_where_they_start_to_where_they_end(job) -> None:
+    scene = paths_scene(job.mesh, job.path_rigid, job.path_corrected, job.registration)
+    dots = rapid_dots(scene)
+    tips = job.path_corrected.tips_mm
+    assert len(dots) > 5
+    assert dots[[0, -1]] == pytest.approx(tips[-2:])
+    steps = np.linalg.norm(np.diff(pixels(scene.camera, dots), axis=0), axis=1)
+    assert steps == pytest.approx(np.full(len(steps), 13.0), rel=0.1)
+    assert scene.lettering.keys[-1].colour not in ("#8a8a8a", "#d4d4d4", "#d0761f", "#1f4fa3")
+
+
+@pytest.mark.parametrize("again", [0, 1])
+def test_a_rapid_move_without_a_known_way_is_neither_drawn_nor_in_the_legend(job, again: int) -> None:
+    """The first move comes from nobody knows where; a rapid to the same place has no length."""
+    tips = job.path_corrected.tips_mm[:-1]
+    tips = np.vstack([*[tips[:1]] * again, tips])
+    rapid = [True] * (1 + again) + [False] * (len(tips) - 1 - again)
+    path = with_moves(job.path_corrected, tips, rapid)
+    assert len(rapid_dots(paths_scene(job.mesh, path, path, job.registration))) == 0
+
+
+def test_rapid_moves_out_of_view_do_not_shrink_the_picture(job) -> None:
+    tips = job.path_corrected.tips_mm[:-1]
+    cut = with_moves(job.path_corrected, tips, [True] + [False] * (len(tips) - 1))
+    home = np.array([[5e6, 0, 0], [5e6, 1e6, 0]])
+    far = with_moves(job.path_corrected, np.vstack([home, tips]), [True] * 3 + [False] * (len(tips) - 1))
+    away = with_moves(job.path_corrected, np.vstack([home, home[:1], tips]), [True] * 3 + [False] * len(tips))
+    scenes = [paths_scene(job.mesh, path, path, job.registration) for path in (cut, far)]
+    assert scenes[1].camera.mm_per_px == pytest.approx(scenes[0].camera.mm_per_px)
+    placed = pixels(scenes[1].camera, rapid_dots(scenes[1]))
+    assert ((placed >= 0) & (placed <= [1600, 900])).all()
+    # Fed all the way from home, the way is wanted in view; the rapids at home are too.
+    assert paths_scene(job.mesh, away, away, job.registration).camera.mm_per_px > 1000
+
+
+def test_stability_points_are_counted_in_words(job) -> None:
+    for count, told in ((1, "1 stability point,"), (2, "2 stability points,"), (0, "0 stability points,")):
+        points = job.contour.stability_scan_mm[:count]
+        contour = job.with_contour(stability_scan_mm=points)
+        assert told in subdivision_scene(contour, job.registration).lettering.subtitle
 
 
 def test_a_large_scan_is_thinned_evenly_and_the_picture_says_so(job) -> None:

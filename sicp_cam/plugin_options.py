@@ -1,0 +1,94 @@
+"""What a plug-in takes: the options of a reader or a post, as its own code tells them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass
+from typing import Any
+
+from sicp_cam.errors import JobError, printable
+from sicp_cam.option_help import Option, dataclass_options, function_options, summary
+from sicp_cam.option_values import nearest
+from sicp_cam.plugin_registry import FORMATS, POSTPROCESSORS, ROLES, Plugin, owner, owners
+
+__all__ = ["PluginOptions", "keyword_names", "plugin_options", "takes_any", "with_name"]
+
+_GIVEN_BY_US = ("units", "limits")
+_FORMAT = Option("format", "text", "none", "Suffix to treat the file as, where its own one does not tell what it is.")
+
+
+@dataclass(frozen=True, slots=True)
+class PluginOptions:
+    """A plug-in and what it takes.
+
+    Parameters
+    ----------
+    plugin
+        Which one.
+    role
+        One of `ROLES`, or `post`.
+    summary
+        What it is, in one line.
+    options
+        What it takes by name.
+    any_option
+        True if it takes further names, which only its own documentation tells.
+    """
+
+    plugin: Plugin
+    role: str
+    summary: str
+    options: tuple[Option, ...]
+    any_option: bool
+
+    @property
+    def prefix(self) -> str:
+        """What stands before the name of an option behind `--set`: `post.val3`, or `scan`."""
+        return f"post.{self.plugin.name}" if self.role == "post" else self.role
+
+
+def with_name(name: str) -> tuple[Plugin, ...]:
+    """Return the plug-ins that are meant by `val3`, `scan.asc` or, in every role, `.asc`; imports none.
+
+    Raises
+    ------
+    JobError
+        If there is none, with the nearest name; or if two distributions claim it.
+    """
+    claims = {**owners(FORMATS), **owners(POSTPROCESSORS)}
+    suffix = name.removeprefix(".").lower()
+    wanted = [name, name.lower(), *(f"{role}.{suffix}" for role in ROLES)]
+    found = {key: owner(claims[key]) for key in dict.fromkeys(wanted) if key in claims}
+    if not found:
+        raise JobError(f"no plug-in '{printable(name, 60)}'; {nearest(name, claims)}")
+    return tuple(found.values())
+
+
+def plugin_options(plugin: Plugin) -> PluginOptions:
+    """Import a plug-in and describe what it takes.
+
+    Raises
+    ------
+    JobError
+        If it cannot be imported.
+    """
+    thing = plugin.load()
+    if plugin.group == FORMATS:
+        options = (_FORMAT, *function_options(thing, keyword_names(thing)))
+        return PluginOptions(plugin, plugin.name.partition(".")[0], summary(thing), options, takes_any(thing))
+    kind = getattr(thing, "Options", None)
+    known = isinstance(kind, type) and is_dataclass(kind)
+    told = getattr(thing, "summary", "") or summary(thing)
+    return PluginOptions(plugin, "post", str(told), dataclass_options(kind) if known else (), not known)
+
+
+def keyword_names(reader: Callable[..., Any]) -> list[str]:
+    """Return the names of the options that a reader takes, in its own order."""
+    parameters = inspect.signature(reader).parameters.items()
+    return [name for name, p in parameters if p.kind is p.KEYWORD_ONLY and name not in _GIVEN_BY_US]
+
+
+def takes_any(reader: Callable[..., Any]) -> bool:
+    """Return whether a reader also takes options that its signature does not name."""
+    return any(p.kind is p.VAR_KEYWORD for p in inspect.signature(reader).parameters.values())
