@@ -14,8 +14,9 @@ from sicp_cam.rigid_motion import apply, best_fit, is_rigid
 
 __all__ = ["Alignment", "read_alignment"]
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
 _LARGEST_FILE = 2**20
+_LARGEST_MISFIT_MM = 20.0
 _ROUNDING = 1e-3
 """A matrix typed with few digits is rigid to about this; it is made exactly rigid."""
 
@@ -51,9 +52,9 @@ def read_alignment(path: Path) -> Alignment:
     rows, lines = _rows(path)
     width = {len(row) for row in rows}
     if width == {4} and len(rows) == 4:
-        return Alignment(_rigid(path, np.array(rows)), np.zeros(0))
+        return Alignment(_rigid(path, np.array(rows), lines[0]), np.zeros(0))
     if width == {6} and len(rows) >= 3:
-        return _from_pairs(path, np.array(rows))
+        return _from_pairs(path, np.array(rows), lines)
     raise FormatError(
         path,
         f"{len(rows)} rows of {' or '.join(map(str, sorted(width)))} numbers; give a 4x4 matrix T_scan_part,"
@@ -80,18 +81,19 @@ def _rows(path: Path) -> tuple[list[list[float]], list[int]]:
         if not all(_NUMBER.match(word) for word in words):
             raise FormatError(path, f"'{line.strip()}' holds something that is no number", line=number)
         rows.append([float(word) for word in words])
+        if not np.isfinite(rows[-1]).all():
+            raise FormatError(path, "holds a number that is not finite", line=number)
         lines.append(number)
-    if not np.isfinite(np.concatenate([np.zeros(1), *map(np.array, rows)])).all():
-        raise FormatError(path, "holds a number that is not finite")
     return rows, lines
 
 
-def _rigid(path: Path, matrix: FloatArray) -> FloatArray:
+def _rigid(path: Path, matrix: FloatArray, line: int) -> FloatArray:
     if not is_rigid(matrix, _ROUNDING):
         raise FormatError(
             path,
             "the matrix is no rigid motion: its rotation must be orthonormal with determinant +1 (no scale, no mirror)"
             " and its last row 0 0 0 1",
+            line=line,
         )
     exact = np.eye(4)
     U, _, Vt = np.linalg.svd(matrix[:3, :3])
@@ -100,10 +102,20 @@ def _rigid(path: Path, matrix: FloatArray) -> FloatArray:
     return exact
 
 
-def _from_pairs(path: Path, pairs: FloatArray) -> Alignment:
+def _from_pairs(path: Path, pairs: FloatArray, lines: list[int]) -> Alignment:
     part, scan = pairs[:, :3], pairs[:, 3:]
-    spread = np.linalg.svd(part - part.mean(axis=0), compute_uv=False)
-    if spread[1] < 1e-3 * max(float(spread[0]), 1e-9):
-        raise FormatError(path, "the datum points lie on one line; add one beside it")
+    for name, points in (("part", part), ("scan", scan)):
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if spread[1] < 1e-3 * max(float(spread[0]), 1e-9):
+            raise FormatError(path, f"the datum points of the {name} lie on one line; add one beside it", line=lines[0])
     T = best_fit(part, scan)
-    return Alignment(T, np.linalg.norm(apply(T, part) - scan, axis=1))
+    residuals = np.linalg.norm(apply(T, part) - scan, axis=1)
+    worst = int(np.argmax(residuals))
+    if residuals[worst] > _LARGEST_MISFIT_MM:
+        raise FormatError(
+            path,
+            f"the datum pairs do not fit: pair {worst + 1} is {residuals[worst]:.1f} mm off after the best fit;"
+            " check its numbers, the units, and which three columns are the part's",
+            line=lines[worst],
+        )
+    return Alignment(T, residuals)

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
+from sicp_cam.alignment import read_alignment
 from sicp_cam.contour.choice import Assignment, assign
 from sicp_cam.contour.frames import framed
 from sicp_cam.contour.mesh_contours import mesh_contours
+from sicp_cam.contour.projection import nearest
 from sicp_cam.errors import InputError, JobError, PathError, UnitError
-from sicp_cam.model import Contour, FloatArray, Part, Scan, ToolPath
+from sicp_cam.findings import Finding, Level
+from sicp_cam.model import BoolArray, Contour, FloatArray, Part, Scan, ToolPath
 from sicp_cam.registration.register import register_contours
 from sicp_cam.registration.result import Registration
-from sicp_cam.registration.settings import RegistrationSettings
+from sicp_cam.registration.settings import METHODS, RegistrationSettings
+from sicp_cam.rigid_motion import is_rigid
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
+from sicp_cam.toolpath.steps import Steps, divided, feed_steps
 from sicp_cam.toolpath.transfer import CorrectedPath, correct_path
 from sicp_cam.units import MM_PER_UNIT
 
-__all__ = ["PartRegistration", "check_scan_unit", "choose_contours", "contours_of", "register"]
+__all__ = ["PartRegistration", "check_scan_unit", "choice_findings", "choose_contours", "contours_of", "register"]
+
+STEP_MM = 2.0
+OTHER_SKIN_MM = 1.0
+"""How much nearer another contour must be to be worth a warning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,22 +49,18 @@ class PartRegistration:
     toolpath: ToolPathSettings = field(default_factory=ToolPathSettings)
     gates: GateLimits = field(default_factory=GateLimits)
 
-    def assignment(self, path: ToolPath) -> Assignment:
-        """Return which registered contour each move of a path in the part frame follows."""
+    def followed(self, path: ToolPath) -> tuple[Steps, Assignment]:
+        """Return the moves of a path in the part frame as steps, and which registered contour each step follows."""
+        steps = divided(path, feed_steps(path, self.toolpath.step_mm))
         curves = [contour.nominal for contour in self.result.contours]
-        return assign(path.tips_mm, path.axes, ~path.rapid, curves, self.gates.path_distance_mm)
+        feed = ~path.rapid[steps.source]
+        return steps, assign(steps.tips_mm, steps.axes, feed, curves, self.gates.path_distance_mm)
 
     def apply(self, path: ToolPath) -> CorrectedPath:
         """Return a path in the part frame corrected to the scan; nothing is judged and nothing is written."""
-        assignment = self.assignment(path)
-        return correct_path(
-            path,
-            assignment,
-            self.result.contours,
-            self.result.T_scan_part,
-            self.toolpath,
-            self.gates.path_distance_mm,
-        )
+        steps, assignment = self.followed(path)
+        T_scan_part, limit = self.result.T_scan_part, self.gates.path_distance_mm
+        return correct_path(path, steps, assignment, self.result.contours, T_scan_part, self.toolpath, limit)
 
 
 def contours_of(part: Part) -> tuple[Contour, ...]:
@@ -87,27 +94,27 @@ def choose_contours(
     wanted
         Numbers that the operator gave.
     path_distance_mm
-        Largest median distance of the feed moves from the contours they follow.
+        Largest median distance of the feed travel from the contours it follows.
 
     Raises
     ------
     JobError
         If a number does not exist, or there is neither a path nor a number.
     PathError
-        If the path lies nowhere near a contour.
+        If the path lies nowhere near a contour, or cuts along one that is not among the wanted ones.
     """
     if wanted is not None:
         missing = [number for number in wanted if not 1 <= number <= len(contours)]
         if missing:
             raise JobError(f"contour: the part has no contour {missing[0]}; it has 1 to {len(contours)}")
-        return {number: contours[number - 1] for number in wanted}
+        chosen = {number: contours[number - 1] for number in wanted}
+        if path is not None:
+            _refuse_unfollowed(contours, chosen, path, path_distance_mm)
+        return chosen
     if path is None:
         raise JobError("contour: give a path, or the numbers of the contours; see sicp-cam inspect")
-    feed = ~path.rapid
-    if not feed.any():
-        raise PathError("the path has rapid moves only; there is nothing to correct")
-    curves = [framed(contour) for contour in contours]
-    found = assign(path.tips_mm, path.axes, feed, curves, path_distance_mm)
+    steps, feed = _feed(path)
+    found = _assigned(contours, steps, feed, path_distance_mm)
     distance = float(np.median(found.distance_mm[feed]))
     if distance > path_distance_mm:
         raise PathError(
@@ -115,6 +122,58 @@ def choose_contours(
             " check --path-units, and that path and part have one frame, or raise gates.path_distance_mm"
         )
     return {number + 1: contours[number] for number in found.used}
+
+
+def _feed(path: ToolPath) -> tuple[Steps, BoolArray]:
+    if path.rapid.all():
+        raise PathError("the path has rapid moves only; there is nothing to correct")
+    steps = divided(path, feed_steps(path, STEP_MM))
+    return steps, ~path.rapid[steps.source]
+
+
+def _assigned(contours: Sequence[Contour], steps: Steps, feed: BoolArray, path_distance_mm: float) -> Assignment:
+    curves = [framed(contour) for contour in contours]
+    narrow = [not len(contour.ring_points_mm) for contour in contours]
+    return assign(steps.tips_mm, steps.axes, feed, curves, path_distance_mm, narrow)
+
+
+def _refuse_unfollowed(
+    contours: Sequence[Contour], chosen: Mapping[int, Contour], path: ToolPath, path_distance_mm: float
+) -> None:
+    """Refuse a choice of contours that leaves feed moves without theirs: they would only be carried rigidly."""
+    steps, feed = _feed(path)
+    best = _assigned(contours, steps, feed, path_distance_mm)
+    near = [nearest(steps.tips_mm, framed(contour))[1] for contour in chosen.values()]
+    further = np.min(near, axis=0) - best.distance_mm
+    lost = feed & (best.distance_mm <= path_distance_mm) & (further > path_distance_mm)
+    if lost.any():
+        number = int(best.contour[lost][0]) + 1
+        line = int(path.lines[steps.source[lost][0]])
+        raise PathError(
+            f"the path cuts along contour {number} too (line {line}), which is not among the chosen ones;"
+            f" add it: --contour {','.join(map(str, [*chosen, number]))}"
+        )
+
+
+def choice_findings(contours: Sequence[Contour], chosen: Mapping[int, Contour], path: ToolPath) -> tuple[Finding, ...]:
+    """Return a warning where the path lies nearer to another contour than to the chosen one.
+
+    On a thin part that is the other skin: the tool axis chose this one, or the operator did. The geometry cannot tell
+    a tool that reaches through the part from an axis that points the wrong way.
+    """
+    steps, feed = _feed(path)
+    distances = {n: nearest(steps.tips_mm[feed], framed(c))[1] for n, c in enumerate(contours, 1)}
+    own = np.min([distances[number] for number in chosen], axis=0)
+    median = {number: float(np.median(distance)) for number, distance in distances.items()}
+    closest = min(median, key=lambda number: median[number])
+    if float(np.median(own)) - median[closest] < OTHER_SKIN_MM or len(chosen) > 1:
+        return ()
+    (number,) = chosen
+    text = (
+        f"the path runs {np.median(own):.2f} mm from contour {number}, but {median[closest]:.2f} mm from contour"
+        f" {closest}: the scan must show the side of contour {number}, and the tool axis must leave the part there"
+    )
+    return (Finding(405, Level.WARN, text, f"contour {number}"),)
 
 
 def check_scan_unit(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> None:
@@ -135,12 +194,13 @@ def check_scan_unit(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> 
     most = 1.5 * max(_diagonal(part.mesh.vertices_mm), 2.0 * least)
     if least <= size <= most:
         return
-    for unit, factor in MM_PER_UNIT.items():
-        if unit != "mm" and least <= size * factor <= most:
-            raise UnitError(
-                f"{scan.source.path}: {size:.4g} mm across, where the part has {most / 1.5:.4g} mm;"
-                f" it seems to be in {unit}: give --scan-units {unit}, or --scan-units mm if it is not"
-            )
+    fitting = [unit for unit, factor in MM_PER_UNIT.items() if unit != "mm" and least <= size * factor <= most]
+    if fitting:
+        options = " or ".join(f"--scan-units {unit}" for unit in fitting)
+        raise UnitError(
+            f"{scan.source.path}: {size:.4g} mm across, where the part has {_diagonal(part.mesh.vertices_mm):.4g} mm;"
+            f" it seems to be in {' or '.join(fitting)}: give {options}, or --scan-units mm if it is not"
+        )
 
 
 def _diagonal(points_mm: FloatArray) -> float:
@@ -153,7 +213,7 @@ def register(
     *,
     path: ToolPath | None = None,
     method: str = "sicp",
-    align: FloatArray | None = None,
+    align: FloatArray | str | os.PathLike[str] | None = None,
     contours: Sequence[int] | None = None,
     settings: RegistrationSettings | None = None,
     toolpath: ToolPathSettings | None = None,
@@ -170,7 +230,7 @@ def register(
     method
         `sicp`, `rigid` or `paper`.
     align
-        (4, 4) rough T_scan_part in mm; None finds it from the geometry.
+        (4, 4) rough T_scan_part in mm, or a file as `--align` takes it; None finds it from the geometry.
     contours
         Numbers of the contours, from 1, instead of a path.
     settings, toolpath, gates
@@ -183,6 +243,12 @@ def register(
     RegistrationError
         If the scan cannot be registered with any confidence.
     """
+    if method not in METHODS:
+        raise JobError(f"method: must be one of {', '.join(METHODS)}, not {method!r}")
+    if isinstance(align, str | os.PathLike):
+        align = read_alignment(Path(align)).T_scan_part
+    if align is not None and not is_rigid(np.asarray(align)):
+        raise JobError("align: no rigid motion; a finite (4, 4) matrix T_scan_part without scale or mirror is needed")
     gates = gates or GateLimits()
     chosen = choose_contours(contours_of(part), path, contours, gates.path_distance_mm)
     check_scan_unit(scan, part, chosen)

@@ -30,7 +30,7 @@ def absent(path: Path) -> str:
     with contextlib.suppress(OSError):
         names = [entry.name for entry in itertools.islice(folder.iterdir(), _NAMES_LOOKED_AT)]
     near = closest(path.name, names)
-    return f"no such file; did you mean {printable(str(folder / near))}?" if near else "no such file"
+    return f"no such file (did you mean {printable(str(folder / near))}?)" if near else "no such file"
 
 
 def no_job(path: Path) -> str | None:

@@ -30,8 +30,9 @@ from typing import Any, Literal, get_type_hints
 
 from sicp_cam.errors import JobError, printable
 from sicp_cam.input_files import absent, wrong_places
-from sicp_cam.job_layers import OPTION_TABLES, Layer
-from sicp_cam.job_tables import GATES, RANGES, TABLES, table_key
+from sicp_cam.job_keys import misplaced
+from sicp_cam.job_layers import Layer
+from sicp_cam.job_tables import GATES, RANGES, TABLES
 from sicp_cam.limits import Limits
 from sicp_cam.option_values import Word, closest, converted, nearest, table
 from sicp_cam.output_names import name_problem
@@ -55,28 +56,36 @@ class Job:
 
     Parameters
     ----------
-    cad, scan, path
-        The nominal part, its measured surface, the path to be corrected.
+    cad
+        The nominal part.
+    scan
+        Its measured surface.
+    path
+        The path to be corrected, in the frame of the part.
     out
-        Folder of the results.
+        Folder of the results; made if it does not exist.
     post
         Names of the postprocessors that write the program.
     name
         Stem of the output files, and name of the program.
     method
-        How the deformation is found: one of `METHODS` of the registration.
+        How the deformation is found: sicp, rigid or paper.
     contour
-        Numbers of the contours to be registered, or "auto": those that the path follows.
+        Numbers of the contours to be registered, or auto: those that the path follows.
     align
-        "auto", "given" (the scan lies roughly in the part frame), or a file with the rough pose.
+        auto, given (the scan lies roughly in the part frame), or a file with the rough pose or datum pairs.
     frame
         Frame of the program's coordinates: that of the scan, or that of the part.
     cad_units, scan_units, path_units
-        Units of files that do not state theirs.
+        Unit of the file, where it does not state its own; mm where neither does.
     report
-        Kinds of report pages; empty for none.
-    force, strict, dry_run
-        Replace existing results; let warnings end the run; write nothing.
+        Kinds of report pages; none for no report.
+    force
+        Replace existing results.
+    strict
+        Let warnings end the run.
+    dry_run
+        Write nothing.
     override
         Gates that may be broken, by name.
     registration, toolpath, gates, limits
@@ -121,6 +130,8 @@ _NAME_LENGTH = 120
 _ROLES = {"part": "cad", "scan": "scan", "path": "path"}
 _NO_REPORT = "; or none for no report"
 _CONTOUR = "must be auto or numbers of contours from 1, such as 1,2; see sicp-cam inspect"
+
+
 @dataclass(frozen=True, slots=True)
 class _Stated:
     value: object
@@ -148,7 +159,7 @@ def build(*layers: Layer) -> Job:
                 values[key] = _plain_value(key, stated[key])
             except ValueError as error:
                 problems[key] = str(error)
-        elif problem := _misplaced(key, stated[key].value):
+        elif problem := misplaced(key, stated[key].value, _KEYS):
             problems[key] = problem
     problems |= _wrong_places(values, stated)
     for name, kind in TABLES.items():
@@ -232,7 +243,8 @@ def _checked_path(key: str, path: Path) -> Path:
     elif path.is_dir():
         raise ValueError(f"{name} is a folder; give a file")
     elif not path.exists():
-        raise ValueError(f"{name}: {absent(path)}{'; or give auto or given' if key == 'align' else ''}")
+        near = closest(path.name, ("auto", "given")) if key == "align" else None
+        raise ValueError(f"{name}: no such file (did you mean {near}?)" if near else f"{name}: {absent(path)}")
     return path
 
 
@@ -243,36 +255,6 @@ def _wrong_places(values: Mapping[str, Any], stated: Mapping[str, _Stated]) -> d
         if key in values and f"options.{role}.format" not in stated  # which says what the file is
     }
     return {_ROLES[role]: problem for role, problem in wrong_places(files).items()}
-
-
-def _misplaced(key: str, value: object) -> str | None:
-    """Say why a key that is no plain one has no place in a job; what lies below a table, the table itself checks."""
-    first, _, rest = key.partition(".")
-    if key in (*TABLES, "options") or (first == "options" and rest in OPTION_TABLES):
-        return None if value == {} else f"must be a table, not {printable(str(value), 60)}"
-    if first in TABLES:
-        return None
-    if first == "options":
-        option_table = rest.partition(".")[0]
-        return None if option_table in OPTION_TABLES else f"unknown table; {nearest(option_table, OPTION_TABLES)}"
-    if first in OPTION_TABLES:
-        return f"{first} takes a value; the options of its reader or post stand in the table options.{first}"
-    if first in _KEYS:
-        return f"{first} takes a value, not a table"
-    return f"unknown key; {_meant(key)}"
-
-
-def _meant(key: str) -> str:
-    """Say which key was meant: one of a table whose name was left out, an option of a post, or one spelt nearly so."""
-    first, _, rest = key.partition(".")
-    if whole := table_key(key):
-        return f"did you mean {whole}?"
-    if rest and first in owners(POSTPROCESSORS):
-        return f"did you mean options.post.{printable(key)}?"
-    known = (*_KEYS, *TABLES, "options")
-    inner = {f.name: f"{name}.{f.name}" for name, kind in TABLES.items() for f in fields(kind)}
-    near = None if closest(first, known) else closest(key, inner)
-    return f"did you mean {inner[near]}?" if near else nearest(first, known)
 
 
 def _post_options(

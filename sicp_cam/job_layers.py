@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sicp_cam.errors import JobError, printable
+from sicp_cam.input_files import absent, no_job
 from sicp_cam.option_values import Word
 
 __all__ = ["OPTION_TABLES", "Layer", "environment", "load", "settings"]
@@ -56,12 +57,31 @@ def load(path: Path) -> Layer:
     """
     name = printable(str(path))
     try:
-        values = tomllib.loads(_content(path).decode("utf-8-sig"))
+        with path.open("rb") as stream:
+            content = stream.read(_JOB_BYTES + 1)
     except OSError as error:
-        raise JobError(f"{name}: cannot be read: {_why_not(path, error)}") from error
-    except (ValueError, RecursionError) as error:  # of which UnicodeDecodeError and TOMLDecodeError are kinds
-        raise JobError(f"{name}{no_job_text(path, error)}") from error
+        reason = absent(path) if isinstance(error, FileNotFoundError) else f"{error.strerror}; give a job file"
+        told = f"; {no_job(path)}" if no_job(path) else ""
+        raise JobError(f"{name}: cannot be read: {reason}{told}") from error
+    try:
+        values = _parsed(content)
+    except ValueError as error:
+        raise JobError(f"{name}: {no_job(path)}" if no_job(path) else f"{name}{error}") from error
     return Layer(name, dict(_flat(values, "")), path.parent)
+
+
+def _parsed(content: bytes) -> dict[str, Any]:
+    """Return the values of a job file; ValueError says what is wrong, to stand behind the file's name."""
+    if len(content) > _JOB_BYTES:
+        raise ValueError(f": larger than {_JOB_BYTES} bytes; this is no job file")
+    try:
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise ValueError(f", byte {error.start}: not UTF-8; save the job file as UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f": not TOML: {printable(str(error))}") from error
+    except RecursionError as error:
+        raise ValueError(": nested too deeply to be a job file") from error
 
 
 def environment(variables: Mapping[str, str] | None = None) -> Layer:

@@ -93,7 +93,11 @@ def dataclass_options(kind: type, ranges: Mapping[str, Range] | None = None) -> 
 
 def function_options(function: Callable[..., Any], names: typing.Iterable[str]) -> tuple[Option, ...]:
     """Describe some keyword-only parameters of a function, by its `Parameters` section."""
-    texts, hints, parameters = parameter_texts(function), annotations_of(function), inspect.signature(function).parameters
+    texts, hints, parameters = (
+        parameter_texts(function),
+        annotations_of(function),
+        inspect.signature(function).parameters,
+    )
     options = []
     for name in names:
         default = parameters[name].default
@@ -114,7 +118,9 @@ def annotations_of(thing: Any) -> dict[str, Any]:
         return typing.get_type_hints(thing)
     except (NameError, AttributeError, TypeError) as error:
         where = f"{thing.__module__}:{thing.__qualname__}"
-        raise JobError(f"plug-in {where}: a type of its options is not known: {error}; report it to its author") from error
+        raise JobError(
+            f"plug-in {where}: a type of its options is not known: {error}; report it to its author"
+        ) from error
 
 
 def written(value: object) -> str:
@@ -163,7 +169,11 @@ def _texts_under_fields(kind: type) -> dict[str, str]:
         for field, text in itertools.pairwise(getattr(definition, "body", ())):
             if not (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)):
                 continue
-            if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str):
+            if (
+                isinstance(text, ast.Expr)
+                and isinstance(text.value, ast.Constant)
+                and isinstance(text.value.value, str)
+            ):
                 texts[field.target.id] = _one_line(text.value.value)
     return texts
 
@@ -196,5 +206,5 @@ def _either(words: list[str]) -> str:
 def _span(allowed: Range) -> str:
     low, high = allowed
     if high < math.inf:
-        return f" from {low:g} to {high:g}"
-    return f" of at least {low:g}" if low > -math.inf else ""
+        return f" from {low:.12g} to {high:.12g}"
+    return f" of at least {low:.12g}" if low > -math.inf else ""

@@ -30,6 +30,7 @@ MANIFEST = "result.json"
 SUPERSEDED = ".superseded"
 """What is appended to the name of a program that no longer holds."""
 
+_NAMED = 8
 _log = logging.getLogger(__name__)
 
 
@@ -59,10 +60,7 @@ def check_free(out: Path, names: Iterable[str], force: bool = False, inputs: Ite
     tops = _tops(names)
     existing = [top for top in tops if os.path.lexists(out / top)]
     if existing and not force:
-        listed = ", ".join(existing[:4]) + (" ..." if len(existing) > 4 else "")
-        raise OutputError(
-            f"{printable(str(out))}: {listed} exists already; use --force to replace it, or another --out"
-        )
+        raise OutputError(f"{printable(str(out))}: {_told(out, existing)}")
     for top in existing:
         _check_replaceable(out / top, [name for name in names if name.startswith(f"{top}/")], inputs)
 
@@ -136,12 +134,9 @@ def supersede(out: Path, inputs: Iterable[Path] = ()) -> list[str]:
     OutputError
         If a program cannot be renamed.
     """
-    try:
-        listed = json.loads((out / MANIFEST).read_bytes())["outputs"]
-        names = [str(entry["path"]) for entry in listed if entry["kind"] == "program"]
-        check_names([MANIFEST, *names])
-    except (OSError, ValueError, KeyError, TypeError, OutputError):
-        return []  # no result of ours
+    names = _programs(out)
+    if names is None:
+        return []
     kept = {Path(path).resolve() for path in inputs}
     tops = [top for top in _tops(names) if os.path.lexists(out / top) and (out / top).resolve() not in kept]
     try:
@@ -158,6 +153,26 @@ def supersede(out: Path, inputs: Iterable[Path] = ()) -> list[str]:
             f" {error.strerror or error}; remove it by hand"
         ) from error
     return tops
+
+
+def _programs(out: Path) -> list[str] | None:
+    """Return the names of the programs of the result in a folder; None if it holds no result of ours."""
+    try:
+        listed = json.loads((out / MANIFEST).read_bytes())["outputs"]
+        names = [str(entry["path"]) for entry in listed if entry["kind"] == "program"]
+        check_names([MANIFEST, *names])
+    except (OSError, ValueError, KeyError, TypeError, OutputError):
+        return None
+    return names
+
+
+def _told(out: Path, existing: list[str]) -> str:
+    """Say what stands in the way, with the programs of a result that would be replaced."""
+    programs = _tops(_programs(out) or []) if MANIFEST in existing else []
+    listed = [*existing, *(top for top in programs if top not in existing and os.path.lexists(out / top))]
+    names = ", ".join(printable(name, 60) for name in listed[:_NAMED]) + (" ..." if len(listed) > _NAMED else "")
+    exists, it = ("exists", "it") if len(listed) == 1 else ("exist", "them")
+    return f"{names} {exists} already; use --force (in Python force=True) to replace {it}, or another folder"
 
 
 def _tops(names: Iterable[str]) -> list[str]:

@@ -6,7 +6,6 @@ import json
 import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,11 +15,12 @@ import numpy as np
 
 from sicp_cam import output, plugins
 from sicp_cam.alignment import read_alignment
-from sicp_cam.correction import PartRegistration, check_scan_unit, choose_contours, contours_of
+from sicp_cam.beside import beside
+from sicp_cam.correction import PartRegistration, check_scan_unit, choice_findings, choose_contours, contours_of
 from sicp_cam.errors import InputError, JobError, PathError, RegistrationError, WarningsError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
-from sicp_cam.model import FloatArray
+from sicp_cam.model import FloatArray, Scan, ToolPath
 from sicp_cam.output_names import joined
 from sicp_cam.registration.register import register_contours
 from sicp_cam.result import Correction, Inputs, input_paths, report_files
@@ -32,6 +32,9 @@ __all__ = ["Correction", "Outcome", "Progress", "correct", "run"]
 
 Progress = Callable[[str, float], None]
 """Told the name of each step and the fraction of the whole that is done."""
+
+DATUM_WARNING_MM = 3.0
+"""Misfit of a datum pair above which the operator is warned."""
 
 _log = logging.getLogger(__name__)
 
@@ -128,6 +131,9 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
         raise JobError(f"override: no gate is called '{printable(unknown[0])}'; gates are {', '.join(GATE_NAMES)}")
     for post in job.post:
         plugins.postprocessor(post, job.post_options.get(post, {}))  # a wrong option shows before the long work
+    plugins.check_reader("part", job.cad, job.part_options)
+    plugins.check_reader("scan", job.scan, job.scan_options)
+    plugins.check_reader("path", job.path, job.path_options)
     clock = _Clock(progress)
     with clock.step("read", 0.0):
         T_start, noticed = _start(job)
@@ -143,9 +149,11 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
         _refuse(gates, RegistrationError)
     with clock.step("correct", 0.55):
         corrected = registration.apply(inputs.path)
-        distance = registration.assignment(inputs.path).distance_mm[~inputs.path.rapid]
+        steps, followed = registration.followed(inputs.path)
+        distance = followed.distance_mm[~inputs.path.rapid[steps.source]]
         gates += overridden(path_gates(corrected, distance, job.gates), job.override)
         _refuse(gates, PathError)
+    noticed += choice_findings(contours_of(inputs.part), chosen, inputs.path)
     findings = (*inputs.part.findings, *inputs.scan.findings, *inputs.path.findings, *noticed, *result.findings)
     findings += tuple(
         Finding(501, Level.WARN, f"gate {gate.name} was overridden: {gate.value:.4g}, limit {gate.limit:g}")
@@ -165,8 +173,10 @@ def _start(job: Job) -> tuple[FloatArray | None, tuple[Finding, ...]]:
     if not len(alignment.residuals_mm):
         return alignment.T_scan_part, ()
     worst = int(np.argmax(alignment.residuals_mm))
-    text = f"datum pairs fit within {alignment.residuals_mm[worst]:.2f} mm; the worst is pair {worst + 1}"
-    return alignment.T_scan_part, (Finding(403, Level.INFO, text, str(job.align)),)
+    largest = float(alignment.residuals_mm[worst])
+    text = f"datum pairs fit within {largest:.2f} mm; the worst is pair {worst + 1}"
+    level = Level.WARN if largest > DATUM_WARNING_MM else Level.INFO
+    return alignment.T_scan_part, (Finding(403, level, text, str(job.align)),)
 
 
 def _read(job: Job) -> Inputs:
@@ -176,13 +186,16 @@ def _read(job: Job) -> Inputs:
     """
     feed = {} if job.toolpath.feed_mm_min is None else {"feed_mm_min": job.toolpath.feed_mm_min}
     path_options = {**feed, **job.path_options}
-    with ThreadPoolExecutor(1) as beside:
-        scan = beside.submit(
-            plugins.read_scan, job.scan, units=job.scan_units, limits=job.limits, options=job.scan_options
+
+    def scan_and_path() -> tuple[Scan, ToolPath]:
+        return (
+            plugins.read_scan(job.scan, units=job.scan_units, limits=job.limits, options=job.scan_options),
+            plugins.read_path(job.path, units=job.path_units, limits=job.limits, options=path_options),
         )
-        path = beside.submit(plugins.read_path, job.path, units=job.path_units, limits=job.limits, options=path_options)
-        part = plugins.read_part(job.cad, units=job.cad_units, limits=job.limits, options=job.part_options)
-        return Inputs(part, scan.result(), path.result())
+
+    others = beside(scan_and_path)
+    part = plugins.read_part(job.cad, units=job.cad_units, limits=job.limits, options=job.part_options)
+    return Inputs(part, *others.result())
 
 
 def _refuse(gates: tuple[Gate, ...], error: type[RegistrationError] | type[PathError]) -> None:

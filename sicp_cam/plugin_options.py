@@ -75,12 +75,13 @@ def plugin_options(plugin: Plugin) -> PluginOptions:
     """
     thing = plugin.load()
     if plugin.group == FORMATS:
-        options = (_FORMAT, *function_options(thing, keyword_names(thing)))
-        return PluginOptions(plugin, plugin.name.partition(".")[0], summary(thing), options, takes_any(thing))
+        taken = (_FORMAT, *function_options(thing, keyword_names(thing)))
+        return PluginOptions(plugin, plugin.name.partition(".")[0], summary(thing), taken, takes_any(thing))
     kind = getattr(thing, "Options", None)
-    known = isinstance(kind, type) and is_dataclass(kind)
-    told = getattr(thing, "summary", "") or summary(thing)
-    return PluginOptions(plugin, "post", str(told), dataclass_options(kind) if known else (), not known)
+    told = str(getattr(thing, "summary", "") or summary(thing))
+    if isinstance(kind, type) and is_dataclass(kind):
+        return PluginOptions(plugin, "post", told, dataclass_options(kind), any_option=False)
+    return PluginOptions(plugin, "post", told, (), any_option=True)
 
 
 def keyword_names(reader: Callable[..., Any]) -> list[str]:

@@ -38,7 +38,7 @@ def status(findings: Iterable[Finding], gates: Iterable[Gate]) -> str:
     states = {gate.state for gate in gates}
     if Level.FAIL in levels or "fail" in states:
         return "fail"
-    return "warn" if Level.WARN in levels or "overridden" in states else "ok"
+    return "warn" if Level.WARN in levels or states & {"warn", "overridden"} else "ok"
 
 
 def findings_list(findings: Iterable[Finding]) -> list[dict[str, Any]]:

@@ -266,7 +266,6 @@ def test_nothing_is_judged_by_apply(sagged, registration):
     np.testing.assert_allclose(done.corrected.tips_mm, done.rigid.tips_mm, atol=1e-9)
 
 
-@pytest.mark.xfail(strict=True, reason="the work is done by register_contours, whose ValueError is no SicpError")
 def test_an_unknown_method_is_a_typed_error(sagged):
     part, scan, _ = sagged
     with pytest.raises(SicpError, match="sicp"):
@@ -276,7 +275,6 @@ def test_an_unknown_method_is_a_typed_error(sagged):
 @pytest.mark.parametrize(
     "align", [np.diag([1.0, 1.0, -1.0, 1.0]), 25.4 * np.eye(4), np.full((4, 4), np.nan), np.eye(3)]
 )
-@pytest.mark.xfail(strict=True, reason="a start pose from a script is not checked as one from a file is")
 def test_a_start_that_is_no_rigid_motion_is_a_typed_error_about_the_start(sagged, align):
     part, scan, _ = sagged
     with pytest.raises(SicpError, match="rigid"):

@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sicp_cam import job_layers
+from sicp_cam import job_layers, plugins
 from sicp_cam.errors import JobError
 from sicp_cam.job import Job, build
 from sicp_cam.job_layers import Layer, environment, load
+from sicp_cam.job_tables import GATES, RANGES, TABLES
 from sicp_cam.limits import Limits
-from sicp_cam.option_values import Word, converted
+from sicp_cam.option_values import Word, converted, table
 from sicp_cam.registration.settings import RegistrationSettings
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
 
@@ -189,11 +190,11 @@ def test_every_problem_is_told_at_once_with_its_place(folder):
             "post: names something twice; leave one out",
             "name: '../x' must not contain / \\ : * ? \" < > | or control characters",
             "methd: unknown key; did you mean method?",
-            "method: must be one of sicp, rigid, paper, not 'magic'",
+            "method: no method 'magic'; known: paper, rigid, sicp",
             "contour: must be auto or numbers of contours from 1, such as 1,2; see sicp-cam inspect",
             "frame: must be one of scan, part, not the text 'world'",
             "force: must be true or false, not 1",
-            "report: must be one of pdf, png, not the text 'exe'",
+            "report: must be one of pdf, png, not the text 'exe'; or none for no report",
             "registration.stabilty: unknown key; known: corner_radius_mm, overlap, reach_mm, segments",
             "registration.overlap: must be from 0 to 0.5, not -0.3",
             "registration.segments: must be a whole number, not 1.5",
@@ -269,7 +270,7 @@ def test_a_file_that_is_no_job_is_refused_with_its_name(folder, content, expecte
 
 
 def test_a_job_file_that_cannot_be_read_is_named(folder):
-    for path, reason in ((folder / "nowhere.toml", "No such file"), (folder, "Is a directory")):
+    for path, reason in ((folder / "nowhere.toml", "no such file"), (folder, "Is a directory; give a job file")):
         with pytest.raises(JobError, match=reason) as caught:
             load(path)
         assert str(path) in str(caught.value)
@@ -313,6 +314,114 @@ def test_options_of_a_post_that_the_command_line_leaves_out_do_no_harm(folder):
 def test_python_values_make_a_layer_too(folder):
     layer = Layer("arguments", {**FILES, "cad": folder / "part.step", "contour": (1, 2)}, Path())
     assert (build(layer).cad, build(layer).contour) == (folder / "part.step", (1, 2))
+
+
+@pytest.mark.parametrize(
+    ("stated", "told"),
+    [
+        ({"post": "VAL3"}, "post: no postprocessor 'VAL3'; did you mean val3?"),
+        ({"post": "csv,fanuc"}, "post: no postprocessor 'fanuc'; known: csv, gcode, val3"),
+        ({"method": "rigd"}, "method: no method 'rigd'; did you mean rigid?"),
+        ({"report": "pfd"}, "report: must be one of pdf, png, not 'pfd' (did you mean pdf?); or none for no report"),
+        ({"frame": "Part"}, "frame: must be one of scan, part, not 'Part' (did you mean part?)"),
+        ({"override": "coverge"}, "override: no gate 'coverge'; did you mean coverage?"),
+        ({"cad": "part.stp"}, "cad: part.stp: no such file (did you mean part.step?)"),
+        ({"cad": "prats/part.step"}, "cad: prats/part.step: no such file; there is no folder prats"),
+        ({"align": "atuo"}, "align: atuo: no such file (did you mean auto?)"),
+        ({"align": "pos.txt"}, "align: pos.txt: no such file (did you mean pose.txt?)"),
+    ],
+)
+def test_what_is_nearly_right_is_answered_with_what_was_meant(folder, stated, told):
+    assert problems(command_line(**stated)) == (f"command line: {told}",)
+
+
+@pytest.mark.parametrize(
+    ("pair", "meant"),
+    [
+        ("segments=14", "registration.segments"),
+        ("coverge=0.5", "gates.coverage"),
+        ("regstration.segments=14", "registration"),
+        ("val3.spin_deg=90", "options.post.val3.spin_deg"),
+        ("methd=rigid", "method"),
+    ],
+)
+def test_a_key_without_its_table_is_answered_with_the_whole_one(folder, pair, meant):
+    key = pair.partition("=")[0]
+    assert problems(command_line(pair)) == (f"command line: {key}: unknown key; did you mean {meant}?",)
+
+
+@pytest.mark.parametrize(
+    ("stated", "told"),
+    [
+        (
+            {"cad": "scan.ply", "scan": "part.step"},
+            "cad: scan.ply is read as a scan, not as a part: are --cad and --scan swapped?",
+        ),
+        (
+            {"scan": "trim.apt", "path": "scan.ply"},
+            "scan: trim.apt is read as a path, not as a scan: are --scan and --path swapped?",
+        ),
+        ({"path": "part.step"}, "path: part.step is read as a part, not as a path; give another file with --path"),
+    ],
+)
+def test_files_in_each_others_place_are_told_before_any_is_read(folder, stated, told):
+    assert problems(command_line(**stated)) == (f"command line: {told}",)
+
+
+def test_a_stated_format_has_precedence_over_the_suffix(folder):
+    assert build(command_line("scan.format=csv", scan="trim.apt")).scan == Path("trim.apt")
+
+
+def test_a_suffix_that_nobody_reads_is_left_to_the_reader(folder):
+    (folder / "scan.e57").write_bytes(b"x")
+    assert build(command_line(scan="scan.e57")).scan == Path("scan.e57")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("part.step", b"ISO-10303-21;\n", "this is a part, no job file; give it with --cad"),
+        ("mesh.stl", b"\xff\xfe", "this is a scan or a part, no job file; give it with --scan or --cad"),
+        ("path.nc", b"%\nG0 X1\n", "this is a path, no job file; give it with --path"),
+    ],
+)
+def test_an_input_in_place_of_the_job_file_is_told(folder, name, content, told):
+    (folder / name).write_bytes(content)
+    with pytest.raises(JobError) as caught:
+        load(Path(name))
+    assert caught.value.problems == (f"{name}: {told}",)
+
+
+def test_a_job_file_may_have_any_suffix(folder):
+    path = job_file(folder, "")
+    assert build(load(path.rename(folder / "job.txt"))).scan == folder / "scan.ply"
+
+
+def test_the_gates_that_may_be_overridden_are_those_that_judge():
+    from sicp_cam.toolpath.gates import GATE_NAMES
+
+    assert sorted(GATES) == sorted(GATE_NAMES)
+
+
+def test_every_setting_has_its_default_within_its_range():
+    for name, kind in TABLES.items():
+        assert RANGES[name].keys() <= {f.name for f in dataclasses.fields(kind)}
+        assert table(kind, dataclasses.asdict(kind()), RANGES[name]) == (kind(), {})
+
+
+def test_the_block_of_the_sample_job_holds_when_its_marks_are_taken_away(tmp_path):
+    sample = Path(__file__).resolve().parents[1] / "samples" / "porthole"
+    lines = (sample / "job.toml").read_text(encoding="utf-8").splitlines()
+    block = lines.index("# [options.post.val3]")
+    for name in ("part.step", "scan.ply", "path.apt", "pose_rough.txt"):
+        (tmp_path / name).write_bytes(b"x")
+    text = "\n".join([*lines[:block], *(line.removeprefix("# ") for line in lines[block:])])
+    (tmp_path / "job.toml").write_text(text, encoding="utf-8")
+    options = build(load(tmp_path / "job.toml")).post_options["val3"]
+    assert list(options) == ["tool", "cell", "spindle_link", "first_run"]
+    made = plugins.postprocessor("val3", options).options
+    assert made.tool == (0.0, 0.0, 185.0, 0.0, 0.0, 0.0)
+    assert (made.spindle_link, made.first_run) == ("BasicIO-1\\%Q0", True)
 
 
 JUNK = st.recursive(

@@ -74,9 +74,21 @@ def test_nothing_is_replaced_without_force(tmp_path):
     fill(tmp_path, OLD)
     before = tree(tmp_path)
     for attempt in (lambda: write(tmp_path, NEW), lambda: check_free(tmp_path, ["edge.csv", "edge/"])):
-        with pytest.raises(OutputError, match=r"edge\.csv, edge.* exists already; use --force"):
+        with pytest.raises(OutputError, match=r"edge\.csv, edge.* exist already; use --force \(in Python force=True\)"):
             attempt()
     assert tree(tmp_path) == before
+
+
+def test_the_programs_of_a_result_that_is_there_are_named_with_it(tmp_path):
+    listed = {"outputs": [{"kind": "program", "path": name} for name in ("edge.csv", "edge/edge.pjx", "gone.nc")]}
+    fill(tmp_path, {**OLD, "result.json": json.dumps(listed).encode()})
+    with pytest.raises(OutputError) as caught:
+        check_free(tmp_path, ["result.json"])
+    told = "result.json, edge.csv, edge exist already; use --force (in Python force=True) to replace them"
+    assert str(caught.value) == f"{tmp_path}: {told}, or another folder"
+    (tmp_path / "result.json").write_bytes(b"no JSON")
+    with pytest.raises(OutputError, match=r": result\.json exists already; use --force .* to replace it"):
+        check_free(tmp_path, ["result.json"])
 
 
 def test_force_replaces_files_one_by_one_and_folders_whole(tmp_path):
@@ -120,7 +132,7 @@ def test_a_link_at_the_target_is_replaced_and_not_followed(tmp_path):
     (out / "edge.csv").symlink_to(tmp_path / "elsewhere/precious.csv")
     (out / "edge").symlink_to(tmp_path / "elsewhere/app")
     (out / "result.json").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(OutputError, match="exists already"):
+    with pytest.raises(OutputError, match="exist already"):
         write(out, NEW)
     write(out, NEW, force=True)
     assert files_of(out) == NEW

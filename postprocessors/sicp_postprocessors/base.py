@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any, ClassVar
 
 from sicp_cam.errors import OutputError, PathError, printable
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import Event, EventKind, Program, Status, ToolPath
+from sicp_cam.model import Event, EventKind, Program
 from sicp_postprocessors.checks import (
     common_findings,
     event_findings,
     first_move_findings,
     name_findings,
 )
+from sicp_postprocessors.moves import Move, events_by_move, moves_of
 from sicp_postprocessors.options import NoOptions, build_options
-from sicp_postprocessors.text import file_stem
+from sicp_postprocessors.text import ascii_lines, file_stem
 
-__all__ = [
-    "SAFETY_NOTE",
-    "LinePostprocessor",
-    "Move",
-    "Postprocessor",
-    "events_by_move",
-    "events_in_order",
-    "failures",
-]
+__all__ = ["SAFETY_NOTE", "LinePostprocessor", "Move", "Postprocessor", "failures", "head_remarks"]
 
 SAFETY_NOTE = "not a safety function: verify at reduced speed"
 _NAMED_FAILURES = 5
@@ -40,17 +31,9 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
     return [finding for finding in findings if finding.level is Level.FAIL]
 
 
-def events_in_order(path: ToolPath) -> list[Event]:
-    """Return the events as they come along the path; those before the same move keep their order."""
-    return sorted(path.events, key=lambda event: event.before_move)
-
-
-def events_by_move(path: ToolPath) -> dict[int, list[Event]]:
-    """Return the events before each move; those after the last one stand at the number of moves."""
-    events: dict[int, list[Event]] = defaultdict(list)
-    for event in path.events:
-        events[event.before_move].append(event)
-    return events
+def head_remarks(program: Program) -> list[str]:
+    """Return what the head of every program says: its name, what made it from what, and that it protects nobody."""
+    return [program.name, *program.notes, SAFETY_NOTE]
 
 
 class Postprocessor(ABC):
@@ -67,6 +50,7 @@ class Postprocessor(ABC):
     >>> @dataclass(frozen=True)
     ... class LinearOptions:
     ...     decimals: int = 3
+    ...     '''Decimals of positions and axes.'''
     >>> class Linear(LinePostprocessor):
     ...     name = "linear"
     ...     summary = "LIN lines of a controller that does not exist"
@@ -77,12 +61,15 @@ class Postprocessor(ABC):
     ...     def begin(self, program):
     ...         yield f"PROGRAM {ascii_line(program.name)}"
     ...
+    ...     def comment(self, text):
+    ...         return f"; {text}"
+    ...
     ...     def move(self, move, previous):
     ...         numbers = " ".join(fixed(v, self.options.decimals) for v in (*move.tip_mm, *move.axis))
     ...         yield f"FAST {numbers}" if move.rapid else f"LIN {numbers} {fixed(move.feed_mm_min, 1)}"
     ...
     ...     def event(self, event):
-    ...         yield f"; {ascii_line(event.text)}"
+    ...         yield from self.comments(event.text)
     ...
     ...     def end(self, program):
     ...         yield "END"
@@ -93,7 +80,8 @@ class Postprocessor(ABC):
     ...     rapid=[True, False],
     ...     lines=[1, 2],
     ... )
-    >>> program = Program("edge", path, (Status.APPROACH, Status.COVERED))
+    >>> status = (Status.APPROACH, Status.COVERED)
+    >>> program = Program("edge", path, status, notes=("corrected to the scan of part 7",))
     >>> post = Linear({"decimals": "1"})
     >>> post.preflight(program)
     []
@@ -101,6 +89,9 @@ class Postprocessor(ABC):
     ...     print(file, content.decode(), sep="\n", end="")
     edge.lin
     PROGRAM edge
+    ; edge
+    ; corrected to the scan of part 7
+    ; not a safety function: verify at reduced speed
     FAST 0.0 0.0 50.0 0.0 0.0 1.0
     LIN 0.0 0.0 5.0 0.0 0.0 1.0 600.0
     END
@@ -111,7 +102,7 @@ class Postprocessor(ABC):
     summary: ClassVar[str]
     """One line for the list of plug-ins."""
     Options: ClassVar[type[Any]] = NoOptions
-    """Frozen dataclass of the options, each with a default."""
+    """Frozen dataclass of the options: each field with a default, and under it a docstring that the user reads."""
     missing_feed: ClassVar[Level] = Level.FAIL
     """How much a cutting move without feed matters to the controller."""
     options: Any
@@ -162,35 +153,28 @@ class Postprocessor(ABC):
         """Return the files of a program that has passed `preflight`; called by `write` only."""
 
 
-@dataclass(frozen=True, slots=True)
-class Move:
-    """One move, as the hooks of `LinePostprocessor` see it."""
-
-    index: int
-    tip_mm: tuple[float, float, float]
-    axis: tuple[float, float, float]
-    feed_mm_min: float
-    rapid: bool
-    status: Status
-    orientation: str
-    """What `orientations` returned for this move."""
-
-
 class LinePostprocessor(Postprocessor):
-    """Template of a controller whose program is one file of lines: begin, then moves and events, then end.
+    """Template of a controller whose program is one file of lines: begin, head, setup, moves and events, end.
 
-    The hooks return lines without line ends, in printable ASCII; the example stands at `Postprocessor`.
+    The hooks return lines without line ends, in printable ASCII; the example stands at `Postprocessor`. The head is
+    the template's own, so that name, notes and safety line stand in every program; a post gives it the comment syntax.
     """
 
     suffix: ClassVar[str]
     """Suffix of the file, with its dot."""
     line_end: ClassVar[str] = "\n"
+    comment_drop: ClassVar[str] = ""
+    """Characters that a comment may not hold, such as those that end it."""
     written_events: ClassVar[frozenset[EventKind]] = frozenset(EventKind) - {EventKind.OTHER}
     """Kinds that the `event` hook is asked for; the others are told as findings, because they would be lost."""
 
     @abstractmethod
     def begin(self, program: Program) -> Iterable[str]:
-        """Return the lines before the first event or move."""
+        """Return the lines that must stand before the head."""
+
+    @abstractmethod
+    def comment(self, text: str) -> str:
+        """Return the line of a comment; `text` is one line of printable ASCII, without `comment_drop`."""
 
     @abstractmethod
     def move(self, move: Move, previous: Move | None) -> Iterable[str]:
@@ -203,6 +187,18 @@ class LinePostprocessor(Postprocessor):
     @abstractmethod
     def end(self, program: Program) -> Iterable[str]:
         """Return the lines after the last move and event."""
+
+    def remarks(self, program: Program) -> Iterable[str]:
+        """Return what the head says beyond name, notes and safety line; text of any length."""
+        return ()
+
+    def setup(self, program: Program) -> Iterable[str]:
+        """Return the lines between the head and the first event or move, such as modes."""
+        return ()
+
+    def comments(self, text: str) -> list[str]:
+        """Return text as comment lines: made plain, broken where it is long; none if nothing is left of it."""
+        return [self.comment(line) for line in ascii_lines(text, drop=self.comment_drop)]
 
     def orientations(self, program: Program) -> Sequence[str]:
         """Return the orientation words of every move, for controllers that must see the path as a whole."""
@@ -228,8 +224,10 @@ class LinePostprocessor(Postprocessor):
         Raises
         ------
         OutputError
-            If a hook returns a line that is not printable ASCII on one line.
+            If a hook returns a line that is not printable ASCII on one line, or the comments carry no text.
         """
+        if SAFETY_NOTE.lower() not in self.comment(SAFETY_NOTE).lower():
+            raise OutputError(f"post {self.name} writes comments without their text; mend its comment hook")
         lines = list(self.assemble(self._lines(program)))
         for line in lines:
             if not (line.isascii() and line.isprintable()):
@@ -241,8 +239,11 @@ class LinePostprocessor(Postprocessor):
     def _lines(self, program: Program) -> Iterator[str]:
         events = events_by_move(program.path)
         yield from self.begin(program)
+        for remark in (*head_remarks(program), *self.remarks(program)):
+            yield from self.comments(remark)
+        yield from self.setup(program)
         previous = None
-        for move in _moves(program, self.orientations(program)):
+        for move in moves_of(program, self.orientations(program)):
             yield from self._event_lines(events.get(move.index, []))
             yield from self.move(move, previous)
             previous = move
@@ -253,18 +254,3 @@ class LinePostprocessor(Postprocessor):
         for event in events:
             if event.kind in self.written_events:
                 yield from self.event(event)
-
-
-def _moves(program: Program, orientations: Sequence[str]) -> Iterator[Move]:
-    path = program.path
-    columns = zip(
-        path.tips_mm.tolist(),
-        path.axes.tolist(),
-        path.feeds_mm_min.tolist(),
-        path.rapid.tolist(),
-        program.status,
-        orientations,
-        strict=True,
-    )
-    for index, (tip, axis, feed, rapid, status, orientation) in enumerate(columns):
-        yield Move(index, tuple(tip), tuple(axis), feed, rapid, status, orientation)

@@ -2,8 +2,8 @@
 
 Codes: 601 empty path, 602 feed not valid, 603 feed missing, 604 axis not of unit length, 605 coordinate too large,
 606 event not valid, 607 program frame not rigid, 608 column not valid, 609 name changed, 610 event not written,
-611 begins with a cutting move, 612 program frame is not the scan frame. Posts of this package go on at 620 (rotary
-axes) and 630 (VAL3).
+611 begins with a cutting move, 612 program frame is not the scan frame. Posts of this package go on at 620 (G-code)
+and 630 (VAL3).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS
 from sicp_cam.model import BoolArray, Event, EventKind, Program, ToolPath
 from sicp_cam.rigid_motion import is_rigid
+from sicp_postprocessors.text import counted
 
 __all__ = [
     "common_findings",
@@ -26,6 +27,7 @@ __all__ = [
     "event_place",
     "first_move_findings",
     "frame_findings",
+    "in_scan_frame",
     "move_place",
     "name_findings",
     "stretch_findings",
@@ -87,9 +89,10 @@ def move_place(path: ToolPath, first: int, last: int | None = None) -> str:
     """
     last = first if last is None else last
     lines = path.lines[first], path.lines[last]
-    if first == last:
-        return f"move {first}" + (f", line {lines[0]}" if lines[0] > 0 else "")
-    return f"moves {first} to {last}" + (f", lines {lines[0]} to {lines[1]}" if min(lines) > 0 else "")
+    moves = f"move {first}" if first == last else f"moves {first} to {last}"
+    if min(lines) <= 0:
+        return moves
+    return f"{moves}, line {lines[0]}" if lines[0] == lines[1] else f"{moves}, lines {lines[0]} to {lines[1]}"
 
 
 def event_place(event: Event) -> str:
@@ -107,7 +110,7 @@ def event_findings(path: ToolPath, kinds: set[EventKind], why: str) -> list[Find
         Finding(
             610,
             Level.WARN,
-            f"{kind} {printable(text)!r} is not written: {why}",
+            f"{kind} {printable(text)!r} is not written: {why}" if text else f"{kind} is not written: {why}",
             event_place(events[0]) + (f", and {len(events) - 1} more" if len(events) > 1 else ""),
         )
         for (kind, text), events in lost.items()
@@ -129,11 +132,16 @@ def first_move_findings(path: ToolPath) -> list[Finding]:
     return [Finding(611, Level.INFO, message, move_place(path, 0))]
 
 
+def in_scan_frame(program: Program) -> bool:
+    """Say whether the coordinates are those of the scan; otherwise the program keeps the part's own."""
+    return np.array_equal(program.T_scan_program, np.eye(4))
+
+
 def frame_findings(program: Program, level: Level, remedy: str) -> list[Finding]:
     """Tell that the coordinates are not those of the scan, where the program cannot carry the frame itself."""
-    if np.array_equal(program.T_scan_program, np.eye(4)):
+    if in_scan_frame(program):
         return []
-    return [Finding(612, level, f"the coordinates are in the program frame, not in that of the scan; {remedy}")]
+    return [Finding(612, level, f"the coordinates are in the part frame, not in that of the scan; {remedy}")]
 
 
 def _wrong_events(path: ToolPath) -> list[Finding]:
@@ -148,7 +156,7 @@ def _wrong_events(path: ToolPath) -> list[Finding]:
 
 def _wrong_event(event: Event, moves: int) -> str:
     if not 0 <= event.before_move <= moves:
-        return f"stands outside the path of {moves} moves"
+        return f"stands outside the path of {counted(moves, 'move')}"
     if not math.isfinite(event.value):
         return "has a value that is not finite"
     if abs(event.value) > _LARGEST.get(event.kind, math.inf):
@@ -178,7 +186,7 @@ def _wrong_columns(program: Program) -> list[Finding]:
         wrong = (
             "is not a plain name"
             if not _COLUMN_NAME.fullmatch(name) or lower[name.lower()] > 1
-            else f"has not one number for each of {len(program.path)} moves"
+            else f"has {counted(values.size, 'number')} for {counted(len(program.path), 'move')}"
             if values.shape != (len(program.path),)
             else "holds numbers that are not finite or too large"
             if not (np.abs(values) <= DEFAULT_LIMITS.coordinate_mm).all()

@@ -11,12 +11,14 @@ from sicp_cam.errors import PathError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import Event, EventKind, FloatArray, Program
 from sicp_cam.units import mm_per_unit
-from sicp_postprocessors.base import SAFETY_NOTE, LinePostprocessor, Move, events_in_order, failures
-from sicp_postprocessors.checks import frame_findings, move_place, stretch_findings
+from sicp_postprocessors.base import LinePostprocessor, Move, failures
+from sicp_postprocessors.checks import frame_findings, in_scan_frame, move_place, stretch_findings
 from sicp_postprocessors.gcode_options import GCodeOptions
+from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.numbers import fixed, rounded, trimmed
+from sicp_postprocessors.options import flag
 from sicp_postprocessors.rotary import HeadAngles, axes_from_angles, axis_errors_deg, head_angles
-from sicp_postprocessors.text import ascii_lines, pose_words
+from sicp_postprocessors.text import pose_words
 
 __all__ = ["GCode", "GCodeOptions"]
 
@@ -38,38 +40,46 @@ class GCode(LinePostprocessor):
     Options = GCodeOptions
     options: GCodeOptions
     suffix = ".nc"
+    comment_drop = "()%;"
 
     def preflight(self, program: Program) -> list[Finding]:
-        """Return the findings of every post, of the program frame, and of the rotary axes."""
+        """Return the findings of every post, of the frame of the coordinates, and of the rotary axes."""
         findings = super().preflight(program)
         if failures(findings):
             return findings
         findings += frame_findings(
             program, Level.WARN, "set the work offset of the control to the pose in the head of the program"
         )
+        findings += self._offset_findings(program)
         if self.options.orientation == "rotary":
             findings += self._rotary_findings(program)
         return findings
 
     def begin(self, program: Program) -> Iterator[str]:
-        """Return the head: what it is, where it is valid, and the modes that it relies on."""
-        options = self.options
-        if options.dialect.percent:
+        """Return the percent sign and the O word, where the dialect has them."""
+        if self.options.dialect.percent:
             yield "%"
-        if options.program_number is not None:
-            yield f"O{options.program_number:04d}"
-        kinematics = f" kinematics {options.kinematics} head-head" if options.orientation == "rotary" else ""
+        if self.options.program_number is not None:
+            yield f"O{self.options.program_number:04d}"
+
+    def comment(self, text: str) -> str:
+        """Return a comment, kept from meaning anything to a control."""
+        return self.options.dialect.comment.format(f"- {text}" if _ACTIVE_COMMENT.match(text) else text)
+
+    def remarks(self, program: Program) -> Iterator[str]:
+        """Return which control the program is for, its units, and where its coordinates are valid."""
+        options = self.options
         dwell = "milliseconds" if self._dwell_word() == "P_MS" else "seconds"
-        remarks = [
-            program.name,
-            *program.notes,
-            SAFETY_NOTE,
-            f"units {options.units}, orientation {options.orientation}{kinematics}, dwell in {dwell}",
-        ]
-        if not np.array_equal(program.T_scan_program, np.eye(4)):
-            remarks.append(f"work offset in the scan frame: {pose_words(program.T_scan_program)}")
-        for remark in remarks:
-            yield from self._comment(remark)
+        offset = f"work offset {options.work_offset}" if options.work_offset else "active work offset"
+        yield options.control
+        yield f"units {options.units}, dwell in {dwell}"
+        yield f"coordinates in the {_frame(program)} frame: the {offset} must hold it"
+        if _frame(program) == "part":
+            yield f"its pose in the scan frame: {pose_words(program.T_scan_program)}"
+
+    def setup(self, program: Program) -> Iterator[str]:
+        """Return the modes that the program relies on."""
+        options = self.options
         unit = options.dialect.metric if options.units == "mm" else options.dialect.inch
         yield f"{unit} G90 G94 G17 G40"
         if options.work_offset:
@@ -100,7 +110,7 @@ class GCode(LinePostprocessor):
                 yield self.options.tcp_off or self.options.dialect.tcp_off
                 yield f"T{int(event.value)} M6"
                 if event.text:
-                    yield from self._comment(event.text)
+                    yield from self.comments(event.text)
                 yield self._tcp_on(int(event.value))
             case EventKind.COOLANT:
                 yield "M8" if event.value > 0 else "M9"
@@ -109,7 +119,7 @@ class GCode(LinePostprocessor):
             case EventKind.STOP:
                 yield "M0"
             case EventKind.COMMENT:
-                yield from self._comment(event.text)
+                yield from self.comments(event.text)
 
     def end(self, program: Program) -> Iterator[str]:
         """Return the end: whatever still runs is switched off, tip control too."""
@@ -160,24 +170,38 @@ class GCode(LinePostprocessor):
         decimals = self.options.angle_decimals
         return HeadAngles(rounded(exact.tilt_deg, decimals), rounded(exact.turn_deg, decimals), exact.held)
 
+    def _offset_findings(self, program: Program) -> list[Finding]:
+        if self.options.work_offset:
+            return []
+        message = (
+            f"no work offset is written: the coordinates are those of the {_frame(program)} frame, and the active "
+            f"offset must hold that frame; name one with {flag(self.name, 'work_offset', 'G54')}"
+        )
+        return [Finding(623, Level.INFO, message)]
+
     def _rotary_findings(self, program: Program) -> list[Finding]:
         path, options = program.path, self.options
         angles = self._rotary_angles(path.axes)
         errors = axis_errors_deg(path.axes, axes_from_angles(angles.tilt_deg, angles.turn_deg, options.kinematics))
+        cone = flag(self.name, "singular_cone_deg", f"{options.singular_cone_deg:g}")
+        travel = [flag(self.name, name, "lowest,highest") for name in ("tilt_limits_deg", "turn_limits_deg")]
         first, (low, high), (least, most) = options.kinematics[0], options.tilt_limits_deg, options.turn_limits_deg
         over_tilt = (angles.tilt_deg < low) | (angles.tilt_deg > high)
         over_turn = (angles.turn_deg < least) | (angles.turn_deg > most)
         steps = np.maximum(np.abs(np.diff(angles.turn_deg)), np.abs(np.diff(angles.tilt_deg)))
         large = np.concatenate([[False], steps > options.rotary_step_deg]) & ~path.rapid
         worst = float(errors[angles.held].max(initial=0.0))
-        held = f"near the pole of the rotary axes: C is held there, which turns the axis by at most {worst:.4f} degrees"
-        fast = f"a rotary axis turns further than {options.rotary_step_deg:g} degrees in one cutting move"
+        held = f"near the pole C is held, which turns the axis by at most {worst:.4f} degrees; the cone is {cone}"
+        fast = (
+            f"a rotary axis turns further than {options.rotary_step_deg:g} degrees in one cutting move; "
+            f"divide the move, or allow it with {flag(self.name, 'rotary_step_deg', 'degrees')}"
+        )
+        tilted = f"{first} leaves its travel {low:g} to {high:g} degrees; if it can, set {travel[0]}"
+        turned = f"C leaves its travel {least:g} to {most:g} degrees; if it can, set {travel[1]}"
         return [
             *stretch_findings(path, angles.held, 620, Level.INFO, held),
-            *stretch_findings(
-                path, over_tilt, 621, Level.FAIL, f"{first} leaves its travel {low:g} to {high:g} degrees"
-            ),
-            *stretch_findings(path, over_turn, 621, Level.FAIL, f"C leaves its travel {least:g} to {most:g} degrees"),
+            *stretch_findings(path, over_tilt, 621, Level.FAIL, tilted),
+            *stretch_findings(path, over_turn, 621, Level.FAIL, turned),
             *stretch_findings(path, large, 622, Level.WARN, fast),
         ]
 
@@ -189,8 +213,8 @@ class GCode(LinePostprocessor):
         if wrong.any():
             move = int(np.argmax(wrong))
             raise PathError(
-                f"post gcode, {move_place(program.path, move)}: the rotary words miss the tool axis by "
-                f"{errors[move]:.5f} degrees; use orientation vector and report this"
+                f"post {self.name}, {move_place(program.path, move)}: the rotary words miss the tool axis by "
+                f"{errors[move]:.5f} degrees; set {flag(self.name, 'orientation', 'vector')} and report this"
             )
 
     def _tcp_on(self, tool: int) -> str:
@@ -205,6 +229,6 @@ class GCode(LinePostprocessor):
             return f"G4 P{fixed(round(seconds * 1000.0), 0)}"
         return f"G4 {self._dwell_word()}{fixed(seconds, 3)}"
 
-    def _comment(self, text: str) -> list[str]:
-        lines = ascii_lines(text, drop="()%;")
-        return [self.options.dialect.comment.format(f"- {x}" if _ACTIVE_COMMENT.match(x) else x) for x in lines]
+
+def _frame(program: Program) -> str:
+    return "scan" if in_scan_frame(program) else "part"

@@ -15,6 +15,8 @@ __all__ = ["DIALECTS", "Dialect", "GCodeOptions"]
 class Dialect:
     """Words that a family of controls expects; `{tool}` in `tcp_on` is the H word of the tool, or nothing."""
 
+    family: str
+    orientation: str
     tcp_on: str
     tcp_off: str
     metric: str
@@ -25,13 +27,27 @@ class Dialect:
 
 
 _PARENTHESES, _SEMICOLON = "({})", "; {}"
+_VECTOR = "points from the tip to the holder"
 DIALECTS = {
-    # Fanuc type 2 tool centre point control: I J K is the direction from the tip to the holder.
-    "vector": Dialect("G43.5{tool}", "G49", "G21", "G20", _PARENTHESES, "P", True),
-    # Fanuc type 1: rotary words. LinuxCNC knows neither; there tcp_on is M428 and tcp_off M429 by convention.
-    "rotary": Dialect("G43.4{tool}", "G49", "G21", "G20", _PARENTHESES, "P", True),
+    "vector": Dialect(
+        "Fanuc G43.5 type 2", f"I J K {_VECTOR}", "G43.5{tool}", "G49", "G21", "G20", _PARENTHESES, "P", True
+    ),
+    # LinuxCNC knows neither G43.4 nor G43.5; there tcp_on is M428 and tcp_off M429 by convention.
+    "rotary": Dialect(
+        "Fanuc G43.4 type 1",
+        "rotary words {kinematics}, head-head",
+        "G43.4{tool}",
+        "G49",
+        "G21",
+        "G20",
+        _PARENTHESES,
+        "P",
+        True,
+    ),
     # G710 and G700 are Siemens' own metric and inch, feeds included; comments there begin with a semicolon.
-    "siemens": Dialect("TRAORI", "TRAFOOF", "G710", "G700", _SEMICOLON, "F", False),
+    "siemens": Dialect(
+        "Siemens 840D TRAORI", f"A3 B3 C3 {_VECTOR}", "TRAORI", "TRAFOOF", "G710", "G700", _SEMICOLON, "F", False
+    ),
 }
 
 
@@ -48,9 +64,9 @@ class GCodeOptions:
     tcp_on: str = ""
     """Words that switch tool tip control on; `{tool}` becomes the H word of the tool."""
     tcp_off: str = ""
-    """Words that switch it off: before a tool change and at the end."""
+    """Words that switch tool tip control off: before a tool change and at the end."""
     work_offset: str = ""
-    """Word of the work offset, such as G54."""
+    """Word of the work offset, such as G54; without it the program runs in whatever offset is active."""
     program_number: int | None = None
     """Number of the O word; none if left out."""
     tool: int = 0
@@ -105,6 +121,14 @@ class GCodeOptions:
         if self.decimals is not None:
             return self.decimals
         return 4 if self.units == "mm" else 6
+
+    @property
+    def control(self) -> str:
+        """Family of controls and meaning of the orientation words, for the head of the program."""
+        words = self.dialect.orientation.format(kinematics=self.kinematics)
+        if self.tcp_on:
+            return f"tool tip control {' '.join(self.tcp_on.replace('{tool}', '').split())}: {words}"
+        return f"{self.dialect.family}: {words}"
 
     @property
     def dialect(self) -> Dialect:

@@ -10,8 +10,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from sicp_cam.errors import JobError, printable
+from sicp_postprocessors.text import counted
 
-__all__ = ["NoOptions", "build_options", "outside"]
+__all__ = ["THIS_POST", "NoOptions", "build_options", "flag", "outside"]
+
+THIS_POST = "<post>"
+"""Stands for the name of the post in the problems of an options dataclass, which does not know it."""
 
 T = TypeVar("T")
 
@@ -29,8 +33,9 @@ def build_options(post: str, kind: type[T], given: Mapping[str, object]) -> T:
     """Build the options of a postprocessor, and refuse what does not fit.
 
     Values may be of the field's own type, or strings as they come from a command line. Fields may be of type bool,
-    int, float, str, `Literal[...]` of strings, a fixed-length tuple of floats, or one of these `| None`. Ranges are
-    the concern of the dataclass: its `__post_init__` raises `JobError` with one problem per argument.
+    int, float, str, `Literal[...]` of strings (taken in upper or lower case), a fixed-length tuple of floats, or one
+    of these `| None`. Ranges are the concern of the dataclass: its `__post_init__` raises `JobError` with one problem
+    per argument, in which `THIS_POST` becomes the name of the post.
 
     Raises
     ------
@@ -64,10 +69,19 @@ must be true or false, not 7
     try:
         options = kind(**values)
     except JobError as error:
-        problems += [f"post {post}: {problem}" for problem in error.problems]
+        problems += [f"post {post}: {problem.replace(THIS_POST, post)}" for problem in error.problems]
     if problems:
         raise JobError(*problems)
     return options
+
+
+def flag(post: str, option: str, value: str) -> str:
+    """Return the words of the command line that set an option of a post.
+
+    >>> flag("val3", "blend", "off")
+    '--set post.val3.blend=off'
+    """
+    return f"--set post.{post}.{option}={value}"
 
 
 def outside(name: str, value: float, smallest: float, largest: float) -> list[str]:
@@ -84,12 +98,13 @@ def outside(name: str, value: float, smallest: float, largest: float) -> list[st
 def _convert(value: object, hint: Any) -> Any:
     """Return a value as the type of its field; ValueError names what would fit."""
     if get_origin(hint) in (Union, types.UnionType):
-        if value is None or (isinstance(value, str) and value in ("", "none")):
+        if value is None or (isinstance(value, str) and value.strip().lower() in ("", "none")):
             return None
         return _convert(value, next(kind for kind in get_args(hint) if kind is not types.NoneType))
     if get_origin(hint) is Literal:
-        if isinstance(value, str) and value in get_args(hint):
-            return value
+        words = {word.lower(): word for word in get_args(hint)}
+        if isinstance(value, str) and value.strip().lower() in words:
+            return words[value.strip().lower()]
         raise ValueError(f"one of {', '.join(map(str, get_args(hint)))}")
     if get_origin(hint) is tuple:
         return _numbers(value, len(get_args(hint)))
@@ -130,11 +145,11 @@ def _number(value: object) -> float:
 def _numbers(value: object, count: int) -> tuple[float, ...]:
     parts = value.split(",") if isinstance(value, str) else value
     if not isinstance(parts, Sequence) or len(parts) != count:
-        raise ValueError(f"{count} numbers")
+        raise ValueError(counted(count, "number"))
     try:
         return tuple(_number(part) for part in parts)
     except ValueError:
-        raise ValueError(f"{count} numbers") from None
+        raise ValueError(counted(count, "number")) from None
 
 
 def _text(value: object) -> str:

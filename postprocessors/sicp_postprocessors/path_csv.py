@@ -11,7 +11,7 @@ from sicp_cam.model import Program
 from sicp_postprocessors.base import Postprocessor
 from sicp_postprocessors.checks import frame_findings, name_findings
 from sicp_postprocessors.numbers import rounded
-from sicp_postprocessors.text import file_stem
+from sicp_postprocessors.text import counted, file_stem
 
 __all__ = ["COLUMNS", "PathCsv"]
 
@@ -39,9 +39,9 @@ class PathCsv(Postprocessor):
         ]
         counts = Counter(event.kind for event in program.path.events)
         if counts:
-            told = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items()))
-            findings.append(Finding(610, Level.INFO, f"a table holds moves only; events not written: {told}"))
-        remedy = "apply T_scan_program of the result to them"
+            told = ", ".join(counted(count, f"{kind} event") for kind, count in sorted(counts.items()))
+            findings.append(Finding(610, Level.INFO, f"a table holds moves only; not written: {told}"))
+        remedy = "apply T_scan_part of the result to them, or run with --frame scan"
         return [
             *findings,
             *name_findings(program, file_stem(program.name)),

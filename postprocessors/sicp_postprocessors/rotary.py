@@ -97,4 +97,7 @@ def _tilt_at_pole(axis: list[float], lean_deg: float, tilt: float) -> float:
     """Return the tilt that comes nearest to an axis at the pole while the turn is held."""
     lean = math.radians(lean_deg)
     sideways = axis[0] * math.cos(lean) + axis[1] * math.sin(lean)
-    return max(-180.0, min(180.0, _unwrapped(math.degrees(math.atan2(sideways, axis[2])), tilt)))
+    steep = math.degrees(math.atan2(sideways, axis[2]))
+    near = _unwrapped(steep, tilt)
+    # An axis that turns round from one pole to the other comes from 180 degrees back to 0, not on to 360.
+    return steep if abs(near) > 270.0 else max(-180.0, min(180.0, near))

@@ -9,7 +9,7 @@ import unicodedata
 from sicp_cam.model import FloatArray
 from sicp_postprocessors.numbers import trimmed
 
-__all__ = ["ascii_line", "ascii_lines", "ascii_name", "file_stem", "pose_words"]
+__all__ = ["ascii_line", "ascii_lines", "ascii_name", "counted", "file_stem", "pose_words"]
 
 _RESERVED_STEMS = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 _STEM_BYTES = 120
@@ -62,6 +62,15 @@ def file_stem(name: str) -> str:
     if stem.split(".")[0].strip().lower() in _RESERVED_STEMS:
         stem = f"_{stem}"
     return stem or "program"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun in singular or plural.
+
+    >>> counted(1, "move"), counted(2, "move")
+    ('1 move', '2 moves')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def pose_words(pose: FloatArray) -> str:

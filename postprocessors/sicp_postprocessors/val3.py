@@ -9,9 +9,10 @@ import re
 
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import EventKind, FloatArray, Program
-from sicp_postprocessors.base import SAFETY_NOTE, Postprocessor, failures
-from sicp_postprocessors.checks import event_findings, first_move_findings, name_findings
+from sicp_postprocessors.base import Postprocessor, failures, head_remarks
+from sicp_postprocessors.checks import event_findings, first_move_findings, in_scan_frame, name_findings
 from sicp_postprocessors.numbers import LARGEST, trimmed
+from sicp_postprocessors.options import flag
 from sicp_postprocessors.text import ascii_name
 from sicp_postprocessors.val3_code import (
     closing,
@@ -23,8 +24,16 @@ from sicp_postprocessors.val3_code import (
     stopping,
     tool_names,
 )
-from sicp_postprocessors.val3_findings import cell_findings, flange_findings, spindle_findings, tool_findings
-from sicp_postprocessors.val3_motion import motion_of
+from sicp_postprocessors.val3_findings import (
+    axis_findings,
+    cell_findings,
+    corner_findings,
+    flange_findings,
+    spindle_findings,
+    stop_findings,
+    tool_findings,
+)
+from sicp_postprocessors.val3_motion import motion_of, path_angles
 from sicp_postprocessors.val3_options import Six, Val3Options
 from sicp_postprocessors.val3_poses import pose_from_six, six_from_pose
 from sicp_postprocessors.val3_xml import Variable, data_file, program_file, project_file
@@ -59,18 +68,23 @@ class Val3(Postprocessor):
         findings = super().preflight(program)
         if failures(findings):
             return findings
-        path = program.path
+        path, options = program.path, self.options
+        angles_deg = path_angles(path, options)
         findings += [
             *name_findings(program, application_name(program.name)),
             *first_move_findings(path),
             *event_findings(path, {EventKind.OTHER}, "it is a word of another controller"),
-            *cell_findings(path, self.options),
-            *spindle_findings(path, self.options),
-            *tool_findings(path),
-            *flange_findings(path, self.options),
+            *cell_findings(path, options, self.name),
+            *spindle_findings(path, options, self.name),
+            *tool_findings(path, self.name),
+            *axis_findings(path, angles_deg),
+            *flange_findings(path, angles_deg, self.name),
+            *stop_findings(path, options, self.name),
+            *corner_findings(path, options, self.name),
         ]
         if not abs(self._world_program(program)[:3, 3]).max() <= LARGEST:
-            findings.append(Finding(605, Level.FAIL, f"the frame fPart lies beyond {LARGEST:g} mm; check option cell"))
+            words = flag(self.name, "cell", "x,y,z,rx,ry,rz")
+            findings.append(Finding(605, Level.FAIL, f"the frame fPart lies beyond {LARGEST:g} mm; check {words}"))
         return findings
 
     def files(self, program: Program) -> dict[str, bytes]:
@@ -112,22 +126,37 @@ class Val3(Postprocessor):
 
     def _head(self, program: Program) -> list[str]:
         options = self.options
-        if options.world_origin == "shoulder":
-            world = "world is at the shoulder (axes 1 and 2), not on the base plate; cell was measured from there"
-        else:
-            height = trimmed(options.shoulder_height_mm, 3)
-            world = f"world is at the shoulder; cell was measured from the base plate, {height} mm below, and shifted"
         remarks = [
-            program.name,
-            *program.notes,
-            SAFETY_NOTE,
-            world,
+            *head_remarks(program),
+            self._frame_remark(program),
+            self._world_remark(),
             "points: mm and degrees, R = Rx Ry Rz, in frame fPart; tool Z points out of the flange into the work",
         ]
+        if options.blends:
+            reach = trimmed(options.blend_mm, 6)
+            remarks.append(f"points between cuts are blended, leave and reach {reach} mm at most")
         if options.first_run:
             speed = trimmed(options.first_run_mm_s, 3)
             remarks.append(f"first run: no blending, no move faster than {speed} mm/s")
         return [line for remark in remarks for line in comments(remark)]
+
+    def _frame_remark(self, program: Program) -> str:
+        """Return what fPart is the pose of: the scan frame, or the part in it where the points keep its coordinates."""
+        if self.options.cell is None:
+            pose = "the scan frame" if in_scan_frame(program) else "the part in the scan frame"
+            return f"fPart is the pose of {pose}; no cell is given, so the scan frame is taken as the robot's world"
+        if in_scan_frame(program):
+            return "fPart is the pose of the scan frame in the robot's world: the option cell"
+        return "fPart is the pose of the part in the robot's world: the option cell times its pose in the scan frame"
+
+    def _world_remark(self) -> str:
+        """Return where the world's origin lies, and from where the given cell was measured."""
+        options, world = self.options, "the robot's world is at the shoulder (axes 1 and 2), not on the base plate"
+        if options.world_origin == "base_plate":
+            pose = "the scan frame is taken to lie there" if options.cell is None else "cell was measured from there"
+            height = trimmed(options.shoulder_height_mm, 3)
+            return f"{world}, which is {height} mm below; {pose}, and fPart is shifted by that"
+        return world if options.cell is None else f"{world}; cell was measured from the shoulder"
 
     def _world_program(self, program: Program) -> FloatArray:
         """Return the pose of the program frame in VAL3's world, whose origin is the shoulder."""

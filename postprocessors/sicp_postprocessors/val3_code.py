@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sicp_cam.model import BoolArray, Event, EventKind, ToolPath
-from sicp_postprocessors.base import events_in_order
+from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.text import ascii_line, ascii_lines
 from sicp_postprocessors.val3_motion import Motion
@@ -158,7 +158,7 @@ def _spindle_on(rev_min: float, options: Val3Options, turns_back: bool) -> Itera
     yield from comments(
         f"spindle {trimmed(abs(rev_min), 3)} rev/min {'counter-clockwise' if rev_min < 0 else 'clockwise'}"
     )
-    value = trimmed(abs(rev_min) * options.spindle_speed_scale, 6)
+    value = trimmed(abs(rev_min) * options.speed_scale, 6)
     if options.spindle_speed == "num":
         yield f"nSpindle={value}"
     if options.spindle_speed == "aio":

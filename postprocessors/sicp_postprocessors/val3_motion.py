@@ -6,16 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sicp_cam.model import EventKind, FloatArray, ToolPath
+from sicp_cam.model import BoolArray, EventKind, FloatArray, ToolPath
 from sicp_postprocessors.numbers import fixed, trimmed
 from sicp_postprocessors.val3_options import Val3Options
 from sicp_postprocessors.val3_poses import angles_from_axes
 from sicp_postprocessors.val3_xml import Variable
 
-__all__ = ["Motion", "motion_of", "path_angles"]
+__all__ = ["Motion", "blends_mm", "motion_of", "passed_points", "path_angles"]
 
 _SPEED_DECIMALS = 6
-_BLEND_STEPS = 8
+_SMALLEST_BLEND_MM = 1e-3
+_PASSED = (EventKind.COMMENT, EventKind.OTHER)
+"""Events that the motion does not wait for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,7 @@ def _speeds(path: ToolPath, options: Val3Options) -> tuple[list[str], list[Varia
     cuts: dict[tuple[float, float], str] = {}
     names = ["mStart"]
     feeds = np.minimum(path.feeds_mm_min / 60.0, fastest).round(_SPEED_DECIMALS).tolist()
-    later = zip(path.rapid.tolist()[1:], feeds[1:], _blends_mm(path, options).tolist()[1:], strict=True)
+    later = zip(path.rapid.tolist()[1:], feeds[1:], blends_mm(path, options).tolist()[1:], strict=True)
     for is_rapid, feed, blend in later:
         names.append("mRapid" if is_rapid else cuts.setdefault((feed, blend), f"mCut[{len(cuts)}]"))
     variables = [Variable("mStart", "mdesc", [start]), Variable("mRapid", "mdesc", [rapid])]
@@ -93,25 +95,30 @@ def _mdesc(speed_mm_s: float, blend_mm: float, options: Val3Options) -> dict[str
     }
 
 
-def _blends_mm(path: ToolPath, options: Val3Options) -> FloatArray:
+def passed_points(path: ToolPath) -> BoolArray:
+    """Return where a move may run on into the next (n,): between two cutting moves, unless an event waits for its end.
+
+    The first move never may, because it is a joint move; nor may the last.
+    """
+    cutting = ~path.rapid
+    passed = np.zeros(len(path), np.bool_)
+    passed[1:-1] = cutting[1:-1] & cutting[2:]
+    passed[[e.before_move - 1 for e in path.events if e.before_move > 0 and e.kind not in _PASSED]] = False
+    return passed
+
+
+def blends_mm(path: ToolPath, options: Val3Options) -> FloatArray:
     """Return the blend distance of each move (n,), zero where the tool must come to its point.
 
-    Only points between two cutting moves are rounded, and none where an event waits for the end of the move. Distances
-    go down by halves from `blend_mm`, so that a path of uneven spacing does not need one mdesc for every point.
+    No blend is longer than half of the shorter neighbouring segment. Distances go down by halves from `blend_mm`, so
+    that a path of uneven spacing does not need one mdesc for every point; below a micrometre there is none.
     """
     blends = np.zeros(len(path))
-    if options.blend == "off" or options.first_run:
+    if not options.blends:
         return blends
     lengths = np.linalg.norm(np.diff(path.tips_mm, axis=0), axis=1)
     room = np.minimum(lengths[:-1], lengths[1:]) / 2.0
     steps = np.ceil(np.log2(options.blend_mm / np.maximum(room, 1e-9)))
-    inner = np.where(steps < _BLEND_STEPS, options.blend_mm / 2.0 ** np.maximum(steps, 0.0), 0.0)
-    cutting = ~path.rapid
-    blends[1:-1] = np.where(cutting[1:-1] & cutting[2:], inner, 0.0)
-    waits = [e.before_move - 1 for e in path.events if e.before_move > 0 and e.kind not in _PASSED]
-    blends[waits] = 0.0
+    blends[1:-1] = options.blend_mm / 2.0 ** np.maximum(steps, 0.0)
+    blends[~passed_points(path) | (blends < _SMALLEST_BLEND_MM)] = 0.0
     return blends
-
-
-_PASSED = (EventKind.COMMENT, EventKind.OTHER)
-"""Events that the motion does not wait for."""

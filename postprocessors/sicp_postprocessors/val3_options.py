@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from sicp_cam.errors import JobError
-from sicp_postprocessors.options import outside
+from sicp_postprocessors.options import THIS_POST, flag, outside
 
 __all__ = ["Six", "Val3Options"]
 
@@ -34,11 +34,11 @@ class Val3Options:
     spin: Literal["fixed", "transport"] = "fixed"
     """Keep rz along the path, or turn the tool no more than its axis turns."""
     shoulder: Literal["ssame", "lefty", "righty", "sfree"] = "ssame"
-    """Arm configuration of the first point, which is reached joint by joint; later points keep it."""
+    """Side of the shoulder at the first point, which is reached joint by joint; later points keep it."""
     elbow: Literal["esame", "epositive", "enegative", "efree"] = "esame"
-    """See `shoulder`."""
+    """Way that the elbow bends at the first point; later points keep it."""
     wrist: Literal["wsame", "wpositive", "wnegative", "wfree"] = "wsame"
-    """See `shoulder`."""
+    """Way that the wrist bends at the first point; later points keep it."""
     approach_vel_percent: float = 10.0
     """Joint speed of the move to the first point."""
     rapid_mm_s: float = 250.0
@@ -47,14 +47,14 @@ class Val3Options:
     """Limit of the tool's turning in every move; a move that reaches it is slower than its feed."""
     accel_percent: float = 100.0
     """Acceleration and deceleration of every move, of the robot's nominal value."""
-    blend: Literal["off", "Cartesian"] = "off"
-    """Stop at every point, or round the points between two cutting moves."""
-    blend_mm: float = 1.0
+    blend: Literal["off", "Cartesian"] = "Cartesian"
+    """Round the points between two cutting moves; or `off`: come to rest at every point."""
+    blend_mm: float = 0.5
     """Where blending leaves and reaches the path, at most; never more than half of the shorter neighbouring segment."""
     first_run: bool = False
     """Write a program for the first run: no blending, and no move faster than `first_run_mm_s`."""
     first_run_mm_s: float = 50.0
-    """See `first_run`."""
+    """Speed that no move of a first run exceeds."""
     spindle_link: str = ""
     r"""Digital output that starts the spindle clockwise, such as BasicIO-1\%Q0."""
     spindle_ccw_link: str = ""
@@ -64,9 +64,9 @@ class Val3Options:
     spindle_speed: Literal["none", "num", "aio"] = "none"
     """Leave the speed to the spindle drive, or write it to a number nSpindle, or to an analog output aoSpindle."""
     spindle_speed_link: str = ""
-    """Analog output of the speed."""
-    spindle_speed_scale: float = 1.0
-    """Value for one rev/min."""
+    """Analog output of the spindle speed, for `spindle_speed` = aio."""
+    spindle_speed_scale: float | None = None
+    """Value for one rev/min, such as 0.0005 for 10 V at 20000 rev/min; must be given for aio, and is 1 for num."""
     coolant_link: str = ""
     """Digital output of coolant or extraction."""
     continue_link: str = ""
@@ -74,7 +74,7 @@ class Val3Options:
     log_messages: bool = False
     """Write stops and tool changes to the controller's log."""
     decimals: int = 4
-    """Decimals of positions in mm."""
+    """Decimals of positions, which are in mm."""
     angle_decimals: int = 5
     """Decimals of angles in degrees."""
     max_points_per_array: int = 2000
@@ -95,7 +95,7 @@ class Val3Options:
             *outside("blend_mm", self.blend_mm, 0.001, 1000.0),
             *outside("first_run_mm_s", self.first_run_mm_s, 0.1, 250.0),
             *outside("spindle_dwell_s", self.spindle_dwell_s, 0.0, 600.0),
-            *outside("spindle_speed_scale", self.spindle_speed_scale, 1e-6, 1e3),
+            *outside("spindle_speed_scale", self.speed_scale, 1e-6, 1e3),
             *outside("decimals", self.decimals, 4, 9),
             *outside("angle_decimals", self.angle_decimals, 4, 9),
             *outside("max_points_per_array", self.max_points_per_array, 1, 1_000_000),
@@ -107,5 +107,20 @@ class Val3Options:
             problems.append("options 'world_origin' = base_plate and 'shoulder_height_mm' belong together; give both")
         if (self.spindle_speed == "aio") != bool(self.spindle_speed_link):
             problems.append("options 'spindle_speed' = aio and 'spindle_speed_link' belong together; give both")
+        if self.spindle_speed == "aio" and self.spindle_speed_scale is None:
+            problems.append(
+                "option 'spindle_speed' = aio writes to an analog output, and needs its value for one rev/min; "
+                f"give {flag(THIS_POST, 'spindle_speed_scale', '0.0005')} for 10 V at 20000 rev/min"
+            )
         if problems:
             raise JobError(*problems)
+
+    @property
+    def speed_scale(self) -> float:
+        """Value for one rev/min: 1 where none is given."""
+        return 1.0 if self.spindle_speed_scale is None else self.spindle_speed_scale
+
+    @property
+    def blends(self) -> bool:
+        """Whether points between cutting moves are rounded."""
+        return self.blend == "Cartesian" and not self.first_run

@@ -13,7 +13,8 @@ __all__ = ["COMMANDS", "main"]
 COMMANDS = {
     "correct": ("sicp_cam.cli.correct:correct", "Correct a tool path to the scanned shape and write robot programs."),
     "inspect": ("sicp_cam.cli.inspect:inspect", "Say what is in a scan, a part or a path."),
-    "plugins": ("sicp_cam.cli.plugins_command:plugins", "List who reads and writes what."),
+    "plugins": ("sicp_cam.cli.plugins_command:plugins", "List who reads and writes what, and what each one takes."),
+    "settings": ("sicp_cam.cli.settings_command:settings", "List what a job may set, with types and defaults."),
     "doctor": ("sicp_cam.cli.doctor:doctor", "Say what this machine has, and what it lacks."),
 }
 """Function and one-line description of each command."""
@@ -21,6 +22,10 @@ COMMANDS = {
 _EPILOGUE = (
     "Exit codes: 0 done; 1 a bug; 2 usage or job; 3 an input; 4 registration; 5 a gate of the path; 6 output refused; "
     "7 warnings under --strict; 8 the program is written but a report failed; 130, 143 interrupted."
+)
+_SETTINGS = (
+    "What --set takes: 'sicp-cam settings' lists the settings of registration, toolpath, gates and limits, "
+    "'sicp-cam plugins NAME' the options of a reader or post, such as 'sicp-cam plugins val3'."
 )
 
 
@@ -55,7 +60,8 @@ def _dispatched(words: list[str]) -> int:
         result_action="return_value",
     )
     for name, (function, help_text) in COMMANDS.items():
-        app.command(function, name=name, help=help_text)
+        epilogue = f"{_EPILOGUE}\n\n{_SETTINGS}" if name == "correct" else _EPILOGUE
+        app.command(function, name=name, help=help_text, help_epilogue=epilogue)
     try:
         code = app(words, exit_on_error=False, print_error=False, verbose=False)
     except cyclopts.CycloptsError as error:

@@ -2,43 +2,58 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from sicp_cam.cli.progress import progress_shown
 from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
+from sicp_cam.errors import JobError, printable
+from sicp_cam.job import Job
+from sicp_cam.job_tables import GATES
+from sicp_cam.option_help import written
 
 __all__ = ["correct"]
 
-_Switch: TypeAlias = Annotated[bool | None, Parameter(negative="")]
-_Several: TypeAlias = Annotated[list[str] | None, Parameter(negative="")]
+_DEFAULTS = {field.name: field.default for field in fields(Job)}
+
+
+def _with_default(key: str, text: str | None = None) -> Parameter:
+    """Show in the help what the job takes where the flag is left out; the flag itself is then not stated."""
+    return Parameter(negative="", show_default=text or written(_DEFAULTS[key]))
+
+
+_OVERRIDE = (
+    f"A gate that may be broken: {', '.join(GATES)}. It is named in the program and the report. May be repeated."
+)
+_FILE_UNIT = "as the file states, else mm"
 
 
 def correct(
     job: Path | None = None,
     /,
-    *,
+    *more: Annotated[str, Parameter(show=False)],
     cad: str | None = None,
     scan: str | None = None,
     path: str | None = None,
-    post: _Several = None,
+    post: Annotated[list[str] | None, _with_default("post")] = None,
     out: str | None = None,
-    name: str | None = None,
-    method: str | None = None,
-    contour: str | None = None,
-    align: str | None = None,
-    frame: str | None = None,
-    cad_units: str | None = None,
-    scan_units: str | None = None,
-    path_units: str | None = None,
-    report: _Several = None,
+    name: Annotated[str | None, _with_default("name")] = None,
+    method: Annotated[str | None, _with_default("method")] = None,
+    contour: Annotated[str | None, _with_default("contour")] = None,
+    align: Annotated[str | None, _with_default("align")] = None,
+    frame: Annotated[str | None, _with_default("frame")] = None,
+    cad_units: Annotated[str | None, _with_default("cad_units", _FILE_UNIT)] = None,
+    scan_units: Annotated[str | None, _with_default("scan_units", _FILE_UNIT)] = None,
+    path_units: Annotated[str | None, _with_default("path_units", _FILE_UNIT)] = None,
+    report: Annotated[list[str] | None, _with_default("report")] = None,
     set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
-    override: _Several = None,
-    dry_run: _Switch = None,
-    force: _Switch = None,
-    strict: _Switch = None,
+    override: Annotated[list[str] | None, _with_default("override"), Parameter(help=_OVERRIDE)] = None,
+    dry_run: Annotated[bool | None, _with_default("dry_run")] = None,
+    force: Annotated[bool | None, _with_default("force")] = None,
+    strict: Annotated[bool | None, _with_default("strict")] = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
     talk: Talk = Talk(),  # noqa: B008  # frozen
 ) -> int:
@@ -82,9 +97,7 @@ def correct(
         Report pages, separated by commas: pdf, png; or none.
     set_
         KEY=VALUE: any other setting, such as registration.segments=14, gates.coverage=0.8, scan.decimal=,
-        path.feed_mm_min=1500 or post.val3.spin_deg=90. May be repeated.
-    override
-        A gate that may be broken; it is named in the program and the report. May be repeated.
+        path.feed_mm_min=1500 or post.val3.spin_deg=90; which there are is told below. May be repeated.
     dry_run
         Do everything but write.
     force
@@ -117,7 +130,7 @@ def correct(
         "strict": strict,
     }
     with logging_to(talk):
-        return reported(lambda: _run(job, flags, set_ or [], as_json, talk.quiet), as_json=as_json)
+        return reported(lambda: _run(_only(job, more), flags, set_ or [], as_json, talk.quiet), as_json=as_json)
 
 
 def _run(job_file: Path | None, flags: dict[str, object], pairs: list[str], as_json: bool, quiet: bool) -> int:
@@ -137,6 +150,28 @@ def _run(job_file: Path | None, flags: dict[str, object], pairs: list[str], as_j
         for line in outcome.lines:
             say(line)
     return outcome.exit_code
+
+
+def _only(job: Path | None, more: tuple[str, ...]) -> Path | None:
+    """Refuse a second word without a flag, and say which flags were meant."""
+    if not more:
+        return job
+    from sicp_cam.input_files import FLAGS
+    from sicp_cam.plugins import roles
+
+    words = [str(job), *more]
+    left, meant = dict(FLAGS), []
+    for word in words:
+        role = next((role for role in roles(Path(word)) if role in left), None)
+        meant += [f"{left.pop(role)} {printable(word)}"] if role else []
+    if len(meant) == len(words):
+        raise JobError(
+            f"{printable(', '.join(words))}: give the files with --cad, --scan and --path: {' '.join(meant)}"
+        )
+    raise JobError(
+        f"{printable(', '.join(more))}: one job file is taken, and flags; give the files with --cad, --scan and --path,"
+        " and several values of one flag with commas"
+    )
 
 
 def _joined(words: list[str] | None) -> str | None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -23,11 +22,15 @@ def inspect(
     role: Role | None = None,
     units: str | None = None,
     picture: Path | None = None,
+    force: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
     talk: Talk = Talk(),  # noqa: B008  # frozen
 ) -> int:
-    """Say what is in a file: kind, units, counts, bounds, findings, and for parts and scans their numbered loops.
+    """Say what is in a file: kind, unit, counts, bounds, findings; the contours of a part and the loops of a scan.
+
+    Contours have the numbers that correct --contour takes. A contour is said to be of a skin, or of a wall: a narrow
+    face between two skins, whose contours a path hardly ever follows.
 
     Parameters
     ----------
@@ -38,7 +41,9 @@ def inspect(
     units
         Unit of its numbers, where the file does not state one: mm, cm, m, inch.
     picture
-        Also draw it into this PNG file.
+        Also draw a part or scan into this PNG file, with the numbers of its loops or of the contours of its skins.
+    force
+        Replace an existing picture.
     set_
         KEY=VALUE: what the reader takes, such as decimal=, or format=csv; or a cap, such as limits.points=1000000.
         May be repeated.
@@ -48,12 +53,13 @@ def inspect(
         How much is said.
     """
     with logging_to(talk):
-        return reported(lambda: _run(file, role, units, picture, set_ or [], as_json), as_json=as_json)
+        return reported(lambda: _run(file, role, units, picture, force, set_ or [], as_json), as_json=as_json)
 
 
 def _run(
-    file: Path, role: Role | None, units: str | None, picture: Path | None, pairs: list[str], as_json: bool
+    file: Path, role: Role | None, units: str | None, picture: Path | None, force: bool, pairs: list[str], as_json: bool
 ) -> int:
+    from sicp_cam.cli.inspect_lines import inspect_lines
     from sicp_cam.job_layers import settings
     from sicp_cam.limits import Limits
     from sicp_cam.option_values import table
@@ -76,43 +82,30 @@ def _run(
 
     from sicp_cam import inspection
 
-    document = inspection.inspect(file, role=chosen, units=units, options=options, picture=picture, limits=limits)
+    document = inspection.inspect(
+        file, role=chosen, units=units, options=options, picture=picture, force=force, limits=limits
+    )
     if as_json:
         say_json(document)
     else:
-        for line in _lines(document, 0):
+        for line in inspect_lines(document):
             say(line)
     return 0
 
 
 def _role(file: Path) -> str:
+    from sicp_cam.input_files import absent, is_pose
     from sicp_cam.plugins import roles
 
+    name = printable(str(file))
+    if not file.exists():
+        raise InputError(f"{name}: {absent(file)}")
+    if is_pose(file):
+        raise InputError(f"{name}: this is a pose, a 4x4 matrix; give it with --align")
     possible = roles(file)
     if len(possible) == 1:
         return possible[0]
     if not possible:
-        raise InputError(f"{printable(str(file))}: nothing reads this suffix; see sicp-cam plugins")
-    raise JobError(f"{printable(str(file))}: may be a {' or a '.join(possible)}; say which with --role")
-
-
-def _lines(value: Any, depth: int) -> Iterator[str]:
-    indent = "  " * depth
-    for key, item in value.items() if isinstance(value, dict) else enumerate(value, 1):
-        if isinstance(item, dict | list | tuple) and not _plain(item):
-            yield f"{indent}{key}:"
-            yield from _lines(item, depth + 1)
-        else:
-            yield f"{indent}{key}: {_text(item)}"
-
-
-def _plain(item: Any) -> bool:
-    return not isinstance(item, dict) and not any(isinstance(part, dict | list | tuple) for part in item)
-
-
-def _text(item: Any) -> str:
-    if isinstance(item, list | tuple):
-        return ", ".join(_text(part) for part in item)
-    if isinstance(item, float):
-        return f"{item:.6g}"
-    return printable("-" if item is None else str(item), 1000)
+        job = "; if it is a job, give it to sicp-cam correct" if file.suffix.lower() == ".toml" else ""
+        raise InputError(f"{name}: nothing reads this suffix; see sicp-cam plugins{job}")
+    raise JobError(f"{name}: may be a {' or a '.join(possible)}; say which with --role")

@@ -1,18 +1,29 @@
-"""`sicp-cam plugins`: who reads and writes what."""
+"""`sicp-cam plugins`: who reads and writes what, and what each one takes."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated
+import logging
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
 
+if TYPE_CHECKING:
+    from sicp_cam.findings import Finding
+    from sicp_cam.plugin_options import PluginOptions
+    from sicp_cam.plugin_registry import Plugin
+
 __all__ = ["plugins"]
+
+_UNUSABLE = 2
 
 
 def plugins(
+    name: str | None = None,
+    /,
     *,
     check: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
@@ -20,36 +31,51 @@ def plugins(
 ) -> int:
     """List the readers of scans, parts and paths, and the postprocessors, with the distributions they come from.
 
+    With a name, list the options of that one instead, with types, defaults and the flag that sets each.
+
     Parameters
     ----------
+    name
+        A postprocessor such as val3, or a reader such as scan.asc or path.nc.
     check
-        Also import each one, and report those that fail.
+        Also import each one; exit code 2 if one cannot be imported, or two claim the same name.
     as_json
         Print one JSON document.
     talk
         How much is said.
     """
     with logging_to(talk):
-        return reported(lambda: _run(check, as_json), as_json=as_json)
+        return reported(lambda: _listed(check, as_json) if name is None else _told(name, as_json), as_json=as_json)
 
 
-def _run(check: bool, as_json: bool) -> int:
-    import logging
-
-    from sicp_cam.plugin_registry import POSTPROCESSORS, broken, listing
+def _listed(check: bool, as_json: bool) -> int:
+    from sicp_cam.findings import Level
+    from sicp_cam.plugin_registry import broken, listing
 
     found, findings = listing()
     if check:
         findings += broken(found)
+    code = _UNUSABLE if check and any(finding.level is not Level.INFO for finding in findings) else 0
     if as_json:
         say_json(
             {
                 "schema": "sicp-cam/1",
+                "status": "fail" if code else "ok",
+                "exit_code": code,
                 "plugins": [dataclasses.asdict(plugin) for plugin in found],
                 "findings": [dataclasses.asdict(finding) for finding in findings],
             }
         )
-        return 0
+    else:
+        for line in _table(found):
+            say(line)
+    _log(findings, logging.ERROR if code else logging.WARNING)
+    return code
+
+
+def _table(found: Iterable[Plugin]) -> Iterator[str]:
+    from sicp_cam.plugin_registry import POSTPROCESSORS
+
     rows = [
         (
             "post" if plugin.group == POSTPROCESSORS else plugin.name.partition(".")[0],
@@ -61,9 +87,53 @@ def _run(check: bool, as_json: bool) -> int:
     ]
     widths = [max((len(row[column]) for row in rows), default=0) for column in range(3)]
     for row in rows:
-        say("  ".join([*(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)), row[3]]))
+        yield "  ".join([*(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)), row[3]])
+
+
+def _log(findings: Iterable[Finding], level: int) -> None:
+    """Tell findings as loud as they matter: errors are told under -q too."""
+    log = logging.getLogger("sicp_cam.cli")
     for finding in findings:
-        logging.getLogger("sicp_cam.cli").log(
-            logging.WARNING if finding.level != "info" else logging.INFO, finding.message
-        )
+        log.log(logging.INFO if finding.level == "info" else level, "%s", finding.message)
+
+
+def _told(name: str, as_json: bool) -> int:
+    from sicp_cam.cli.option_lines import option_entries
+    from sicp_cam.plugin_options import plugin_options, with_name
+
+    described = [plugin_options(plugin) for plugin in with_name(name)]
+    if as_json:
+        entries: list[dict[str, Any]] = [
+            {
+                **dataclasses.asdict(one.plugin),
+                "role": one.role,
+                "summary": one.summary,
+                "options": option_entries(one.options, f"--set {one.prefix}."),
+                "any_option": one.any_option,
+            }
+            for one in described
+        ]
+        say_json({"schema": "sicp-cam/1", "plugins": entries})
+    else:
+        for number, one in enumerate(described):
+            for line in ["", *_description(one)] if number else _description(one):
+                say(line)
     return 0
+
+
+def _description(one: PluginOptions) -> Iterator[str]:
+    from sicp_cam.cli.option_lines import option_lines
+    from sicp_cam.errors import printable
+
+    plugin = one.plugin
+    kind = "postprocessor" if one.role == "post" else f"reader of a {one.role}"
+    yield f"{plugin.name}: {kind}, {plugin.value}, from {plugin.owner}"
+    if one.summary:
+        yield printable(one.summary)
+    if one.options:
+        yield f"on the command line as below, in a job file in the table [options.{one.prefix}]:"
+    yield from option_lines(one.options, f"--set {one.prefix}.")
+    if one.any_option:
+        yield "it takes options by name and does not list them; see its own documentation"
+    elif not one.options:
+        yield "it takes no options"

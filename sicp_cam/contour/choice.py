@@ -19,6 +19,8 @@ AXIS_PENALTY_MM = 10.0
 The edges of both skins of a thin part lie closer together than a path may run beside its edge; only the tool axis,
 which leaves the part on the outer side, tells them apart.
 """
+NARROW_PENALTY_MM = 5.0
+"""What a face too narrow for stability points, such as the wall of a thin part, counts for, in mm of distance."""
 SAME_EDGE_MM = 1.0
 """Contours that lie this close to a move are edges of the same place: two skins' corners, a skin and its wall."""
 
@@ -48,6 +50,7 @@ def assign(
     cutting: BoolArray,
     contours: Sequence[FramedCurve],
     on_contour_mm: float,
+    narrow: Sequence[bool] | None = None,
 ) -> Assignment:
     """Assign every move of a path to the contour that it follows.
 
@@ -64,6 +67,8 @@ def assign(
         At least one contour, part frame.
     on_contour_mm
         Feed moves further than this from every contour approach or retract, and do not decide.
+    narrow
+        For each contour, True if its face is too narrow to be the skin that is machined.
     """
     distance = np.empty((len(tips_mm), len(contours)))
     agreement = np.empty_like(distance)
@@ -71,6 +76,8 @@ def assign(
         s_mm, distance[:, i] = nearest(tips_mm, curve)
         agreement[:, i] = np.sum(at(curve, s_mm).outward * axes, axis=1)
     score = distance + AXIS_PENALTY_MM * (1.0 - agreement)
+    if narrow is not None:
+        score += NARROW_PENALTY_MM * np.array(narrow, dtype=np.float64)
     best = np.argmin(score, axis=1)
     rows = np.arange(len(tips_mm))
     voting = cutting & (distance[rows, best] <= on_contour_mm)

@@ -24,7 +24,14 @@ from sicp_cam.rigid_motion import apply, is_rigid
 __all__ = ["register_contours"]
 
 CROP_MARGIN = 1.5
+MOST_CROPS = 4
+RECROP_SHARE = 0.4
+"""Move of the contour by the rigid pose, over the reach, above which the scan is cut out anew."""
 MIN_POINTS = 50
+SHOWN_SHARE = 0.9
+"""Coverage below which the operator is warned."""
+UNSURE_SIDE = 0.67
+"""Misfit of the pose over that of the part turned over above which the scan does not tell the side."""
 WEAK_FREEDOM = 0.05
 
 
@@ -71,9 +78,7 @@ def register_contours(
         whole = prepared(_enough(scan, settings))
         start = find_start(list(nominal.values()), whole, reach_mm=settings.reach_mm)
         T_start, symmetry = start.T_scan_part, start.symmetry
-    near = [moved(contour.curve, T_start) for contour in nominal.values()]
-    surface = prepared(_enough(cropped(scan, near, CROP_MARGIN * settings.reach_mm), settings))
-    pose = register_rigidly(list(nominal.values()), surface, T_start, reach_mm=settings.reach_mm)
+    surface, pose = _rigid(list(nominal.values()), scan, T_start, settings)
     side = None
     if symmetry is None:
         side = side_ratio(list(nominal.values()), surface, pose.T_scan_part, reach_mm=settings.reach_mm)
@@ -90,8 +95,27 @@ def register_contours(
         pose.freedoms,
         symmetry,
         side,
-        _findings(pose, done),
+        _findings(pose, done) + _side_findings(side, scan.normals is not None),
     )
+
+
+def _rigid(
+    contours: list[NominalContour], scan: Scan, T_start: FloatArray, settings: RegistrationSettings
+) -> tuple[ScanSurface, RigidPose]:
+    """Register rigidly to the scan around the contours; again where the pose left the part of the scan looked at."""
+    T = T_start
+    for _ in range(MOST_CROPS):
+        near = [moved(contour.curve, T) for contour in contours]
+        surface = prepared(_enough(cropped(scan, near, CROP_MARGIN * settings.reach_mm), settings))
+        pose = register_rigidly(contours, surface, T, reach_mm=settings.reach_mm)
+        after = [moved(contour.curve, pose.T_scan_part) for contour in contours]
+        shift = max(
+            float(np.linalg.norm(a.points_mm - b.points_mm, axis=1).max()) for a, b in zip(near, after, strict=True)
+        )
+        if shift <= RECROP_SHARE * settings.reach_mm:
+            break
+        T = pose.T_scan_part
+    return surface, pose
 
 
 def _enough(scan: Scan, settings: RegistrationSettings) -> Scan:
@@ -186,9 +210,19 @@ def _findings(pose: RigidPose, done: tuple[tuple[RegisteredContour, float], ...]
             found.append(
                 Finding(
                     402,
-                    Level.INFO,
+                    Level.INFO if share >= SHOWN_SHARE else Level.WARN,
                     f"the scan shows {100.0 * share:.1f} % of the edge; the rest is carried over from both sides",
                     f"contour {contour.number}",
                 )
             )
     return tuple(found)
+
+
+def _side_findings(side: float | None, has_normals: bool) -> tuple[Finding, ...]:
+    if side is None or side < UNSURE_SIDE or has_normals:
+        return ()
+    text = (
+        "the scan fits the part turned over about as well: the start pose alone says which side is outward;"
+        " check it, or scan with normals"
+    )
+    return (Finding(404, Level.WARN, text),)

@@ -46,8 +46,8 @@ _CAPTIONS = {
     "subdivision": "segments, subdivision points and stability points on the corrected contour.",
     "paths": "Nominal path, rigidly registered, and corrected path with tool axes; true to scale.",
     "paths_enlarged": "The same with the correction drawn larger than it is, by the factor in the picture's title.",
-    "correction": "what the correction adds to the rigid pose along the contour. Ticks at the top are the borders of "
-    f"the segments. {SEGMENT_STEPS}",
+    "correction": "what the correction adds to the rigid pose along the contour. Ticks at the top, if there are "
+    f"any, are the borders of the segments. {SEGMENT_STEPS}",
 }
 """In the order in which the report shows them."""
 

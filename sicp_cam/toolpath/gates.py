@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +30,7 @@ class Gate:
     value, limit
         In the unit that `text` names.
     state
-        `ok`, `fail` or `overridden`.
+        `ok`, `warn`, `fail` or `overridden`.
     text
         What the value is, in words.
     """
@@ -42,6 +42,7 @@ class Gate:
     text: str
 
 
+OUT_TEXT = "mean distance of scan and contour out of the surface, mm"
 GATE_NAMES = (
     "coverage",
     "residual_mm",
@@ -50,6 +51,7 @@ GATE_NAMES = (
     "stretch",
     "in_surface_mm",
     "path_distance_mm",
+    "path_coverage",
     "correction_mm",
     "axis_deg",
     "jump_mm",
@@ -60,19 +62,19 @@ def registration_gates(registration: Registration, limits: GateLimits) -> tuple[
     """Judge the registration: how much of the contour was seen, how well it fits, and that it was not stretched."""
     contours = registration.contours
     coverage = min(float(contour.covered.mean()) for contour in contours)
-    out = max(_mean_size(contour.after.out_mm) for contour in contours)
-    normal = max(_mean_size(contour.after.normal_mm) for contour in contours)
-    stretch = max(abs(_length(contour.corrected) / _length(contour.nominal) - 1.0) for contour in contours)
-    aside = max(_largest_aside(contour) for contour in contours)
+    out = _largest(_mean_size(contour.after.out_mm) for contour in contours)
+    normal = _largest(_mean_size(contour.after.normal_mm) for contour in contours)
+    stretch = _largest(abs(_length(contour.corrected) / _length(contour.nominal) - 1.0) for contour in contours)
+    aside = _largest(_largest_aside(contour) for contour in contours)
     return (
         _at_least("coverage", coverage, limits.coverage, "fraction of the contour on which the scan shows the edge"),
-        _at_most("residual_mm", out, limits.residual_mm, "mean distance of scan and contour out of the surface, mm"),
+        _expected(registration.method, _at_most("residual_mm", out, limits.residual_mm, OUT_TEXT)),
         _at_most("edge_residual_mm", normal, limits.edge_residual_mm, "mean distance of scan edge and contour, mm"),
         _at_most(
             "side",
             registration.side or 0.0,
             limits.side,
-            "misfit of the given pose over that of the part turned over; is the other side outward?",
+            "misfit of the given pose over that of the part turned over",
         ),
         _at_most("stretch", stretch, limits.stretch, "relative change of the contour's length"),
         _at_most("in_surface_mm", aside, limits.in_surface_mm, "largest move of the edge in the surface, mm"),
@@ -87,7 +89,7 @@ def path_gates(corrected: CorrectedPath, distance_mm: FloatArray, limits: GateLi
     corrected
         The path before and after.
     distance_mm
-        (m,) distance of each feed move of the source from the contour that it follows.
+        (m,) distance of the steps of all feed moves from the contour that they follow.
     limits
         The limits.
     """
@@ -100,7 +102,13 @@ def path_gates(corrected: CorrectedPath, distance_mm: FloatArray, limits: GateLi
             "path_distance_mm",
             float(np.median(distance_mm)) if len(distance_mm) else np.inf,
             limits.path_distance_mm,
-            "median distance of the feed moves from the contour, mm",
+            "median distance of the feed travel from the contour, mm",
+        ),
+        _at_least(
+            "path_coverage",
+            _covered_share(corrected),
+            limits.path_coverage,
+            "fraction of the cut length along which the scan shows the edge",
         ),
         _at_most(
             "correction_mm", float(size.max()), limits.correction_mm, "largest correction beyond the rigid pose, mm"
@@ -118,6 +126,11 @@ def path_gates(corrected: CorrectedPath, distance_mm: FloatArray, limits: GateLi
             f"largest step of the correction between neighbouring points beyond {SLOPE:g} mm per mm of path, mm",
         ),
     )
+
+
+def _expected(method: str, gate: Gate) -> Gate:
+    """Let the rigid pose miss a bent part with a warning: that is what the operator chose it for."""
+    return replace(gate, state="warn") if method == "rigid" and gate.state == "fail" else gate
 
 
 def overridden(gates: Iterable[Gate], names: Iterable[str]) -> tuple[Gate, ...]:
@@ -141,6 +154,11 @@ def _largest_aside(contour: RegisteredContour) -> float:
     return float(np.abs(np.sum(change * contour.rigid.inward, axis=1)).max())
 
 
+def _largest(values: Iterable[float]) -> float:
+    """Return the largest of several values, NaN if one of them is: a gate must never pass what was not measured."""
+    return float(np.max(list(values)))
+
+
 def _mean_size(values: FloatArray) -> float:
     known = values[np.isfinite(values)]
     return float(np.abs(known).mean()) if len(known) else np.inf
@@ -149,6 +167,19 @@ def _mean_size(values: FloatArray) -> float:
 def _length(curve: FramedCurve) -> float:
     points = np.vstack([curve.points_mm, curve.points_mm[:1]]) if curve.closed else curve.points_mm
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def _covered_share(corrected: CorrectedPath) -> float:
+    """Return the length of the covered cutting moves over that of all cutting moves."""
+    tips = corrected.nominal.tips_mm
+    length = np.linalg.norm(np.diff(tips, axis=0, prepend=tips[:1]), axis=1)
+    cut, covered = (
+        float(sum(step for step, status in zip(length, corrected.status, strict=True) if status in wanted))
+        for wanted in ({Status.COVERED, Status.BRIDGED}, {Status.COVERED})
+    )
+    if cut > 0.0:
+        return covered / cut
+    return 1.0 if Status.BRIDGED not in corrected.status else 0.0
 
 
 def _largest_jump(change: FloatArray, tips_mm: FloatArray, cuts: BoolArray) -> float:

@@ -39,7 +39,9 @@ class GateLimits:
     Parameters
     ----------
     path_distance_mm
-        Distance from its contour up to which a feed move cuts; also the limit of the median over all feed moves.
+        Distance from its contour up to which a feed move cuts; also the limit of the median over the feed travel.
+    path_coverage
+        Least fraction of the cut length along which the scan must show the edge.
     coverage
         Least fraction of the contour on which the scan must show the edge.
     residual_mm
@@ -61,6 +63,7 @@ class GateLimits:
     """
 
     path_distance_mm: float = 20.0
+    path_coverage: float = 0.5
     coverage: float = 0.5
     residual_mm: float = 0.5
     edge_residual_mm: float = 3.0

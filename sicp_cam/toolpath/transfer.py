@@ -14,15 +14,18 @@ import numpy as np
 from sicp_cam.contour.choice import Assignment
 from sicp_cam.contour.frames import FramedCurve, at
 from sicp_cam.contour.projection import nearest
-from sicp_cam.model import BoolArray, Event, FloatArray, IntArray, Status, ToolPath
+from sicp_cam.model import BoolArray, FloatArray, IntArray, Status, ToolPath
 from sicp_cam.registration.result import RegisteredContour
 from sicp_cam.rigid_motion import apply, rotate
 from sicp_cam.toolpath.settings import ToolPathSettings
+from sicp_cam.toolpath.steps import Steps, any_of
 
 __all__ = ["CorrectedPath", "carried", "correct_path"]
 
 AXIS_STEP = np.radians(0.1)
 """Turn of the axis between two points, away from their mean, above which points are added in between."""
+CUTTING_SHARE = 0.6
+"""Share of a move along its contour above which it cuts, though it ends elsewhere."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +53,7 @@ class CorrectedPath:
 
 def correct_path(
     path: ToolPath,
+    steps: Steps,
     assignment: Assignment,
     contours: Sequence[RegisteredContour],
     T_scan_part: FloatArray,
@@ -62,24 +66,30 @@ def correct_path(
     ----------
     path
         The path in the part frame.
+    steps
+        Its moves divided into steps, see `steps.feed_steps`.
     assignment
-        Which of `contours` each move follows.
+        Which of `contours` each step follows, and how far it is from it.
     contours
         The registered contours.
     T_scan_part
         (4, 4) rigid pose.
     settings
-        Band, blend and step.
+        Band, blend and chord.
     on_contour_mm
-        Feed moves that end no further than this from their contour cut; all others approach or retract.
+        Feed moves cut where they run no further than this from their contour; elsewhere they approach or retract.
     """
-    cutting = ~path.rapid & (assignment.distance_mm <= on_contour_mm)
-    nominal, source, follows = _densified(path, assignment.contour, cutting, contours, T_scan_part, settings)
-    tips, axes = carried(nominal.tips_mm, nominal.axes, follows, contours, T_scan_part, settings)
+    source = steps.source
+    cutting = ~path.rapid[source] & (assignment.distance_mm <= on_contour_mm)
+    tips, axes = carried(steps.tips_mm, steps.axes, assignment.contour, contours, T_scan_part, settings)
+    bent = any_of(cutting & _off_straight(tips, axes, steps, settings.chord_mm), source, len(path))
+    kept = bent[source] | (steps.fraction == 1.0)
+    nominal = _with_steps(path, steps, kept)
     rigid = replace(nominal, tips_mm=apply(T_scan_part, nominal.tips_mm), axes=rotate(T_scan_part, nominal.axes))
-    status = _status(nominal, cutting[source], follows, contours)
-    added = np.append(source[1:] == source[:-1], False)
-    return CorrectedPath(nominal, rigid, replace(nominal, tips_mm=tips, axes=axes), status, added)
+    corrected = replace(nominal, tips_mm=tips[kept], axes=axes[kept])
+    cuts = np.where(bent[source], cutting, _mostly(cutting, steps, len(path))[source])[kept]
+    status = _status(nominal, cuts, assignment.contour[kept], contours)
+    return CorrectedPath(nominal, rigid, corrected, status, steps.fraction[kept] < 1.0)
 
 
 def carried(
@@ -127,65 +137,36 @@ def _smoothstep(t: FloatArray) -> FloatArray:
     return risen
 
 
-def _densified(
-    path: ToolPath,
-    follows: IntArray,
-    cutting: BoolArray,
-    contours: Sequence[RegisteredContour],
-    T_scan_part: FloatArray,
-    settings: ToolPathSettings,
-) -> tuple[ToolPath, IntArray, IntArray]:
-    """Add points to long cutting moves that must bend; return the path, the source and the contour of each move."""
-    tips, axes = path.tips_mm, path.axes
-    length = np.linalg.norm(np.diff(tips, axis=0, prepend=tips[:1]), axis=1)
-    along = cutting & np.roll(cutting, 1) & (follows == np.roll(follows, 1))
-    along[:1] = False
-    counts = np.where(along, np.maximum(1, np.ceil(length / settings.step_mm - 1e-6)), 1).astype(np.int64)
-    fine_tips, fine_axes, source = _interpolated(tips, axes, counts)
-    moved_tips, moved_axes = carried(fine_tips, fine_axes, follows[source], contours, T_scan_part, settings)
-    bent = _bends(moved_tips, moved_axes, source, counts, settings.chord_mm)
-    counts = np.where(bent, counts, 1)
-    fine_tips, fine_axes, source = _interpolated(tips, axes, counts)
-    first = np.concatenate([[0], np.cumsum(counts)])
-    events = tuple(_shifted(event, first) for event in path.events)
-    dense = replace(
+def _off_straight(tips: FloatArray, axes: FloatArray, steps: Steps, chord_mm: float) -> BoolArray:
+    """Say which corrected steps leave the straight move between the corrected ends of their move."""
+    last = np.flatnonzero(steps.fraction == 1.0)
+    start, end = last[np.maximum(steps.source - 1, 0)], last[steps.source]
+    t = steps.fraction[:, None]
+    axis = axes[start] + t * (axes[end] - axes[start])
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    off = np.linalg.norm(tips - (tips[start] + t * (tips[end] - tips[start])), axis=1) > chord_mm
+    return np.asarray(off | (np.linalg.norm(axes - axis, axis=1) > AXIS_STEP))
+
+
+def _mostly(cutting: BoolArray, steps: Steps, moves: int) -> BoolArray:
+    """Say which moves cut: those that end on the contour, or run along it for most of their way."""
+    share = np.bincount(steps.source, weights=cutting, minlength=moves) / np.bincount(steps.source, minlength=moves)
+    return np.asarray((share > CUTTING_SHARE) | cutting[steps.fraction == 1.0])
+
+
+def _with_steps(path: ToolPath, steps: Steps, kept: BoolArray) -> ToolPath:
+    """Return the path with the kept steps as moves of their own; events stay before their move's first step."""
+    source = steps.source[kept]
+    first = np.append(np.searchsorted(source, np.arange(len(path))), len(source))
+    return replace(
         path,
-        tips_mm=fine_tips,
-        axes=fine_axes,
+        tips_mm=steps.tips_mm[kept],
+        axes=steps.axes[kept],
         feeds_mm_min=path.feeds_mm_min[source],
         rapid=path.rapid[source],
         lines=path.lines[source],
-        events=events,
+        events=tuple(replace(event, before_move=int(first[event.before_move])) for event in path.events),
     )
-    return dense, source, follows[source]
-
-
-def _shifted(event: Event, first: IntArray) -> Event:
-    return replace(event, before_move=int(first[event.before_move]))
-
-
-def _interpolated(tips: FloatArray, axes: FloatArray, counts: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return each move as `counts` equal steps, tips and axes linear between, and the move that each step is of."""
-    source = np.repeat(np.arange(len(counts)), counts)
-    step = np.arange(len(source)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
-    t = (step / counts[source])[:, None]
-    start = np.maximum(source - 1, 0)
-    fine_tips = np.where(t == 1.0, tips[source], tips[start] + t * (tips[source] - tips[start]))
-    mixed = np.where(t == 1.0, axes[source], axes[start] + t * (axes[source] - axes[start]))
-    return fine_tips, mixed / np.linalg.norm(mixed, axis=1, keepdims=True), source
-
-
-def _bends(tips: FloatArray, axes: FloatArray, source: IntArray, counts: IntArray, chord_mm: float) -> BoolArray:
-    """Say for each source move whether its steps leave the straight move between its ends."""
-    last = np.cumsum(counts) - 1
-    start = np.maximum(source - 1, 0)
-    step = np.arange(len(source)) - np.repeat(last + 1 - counts, counts) + 1
-    t = (step / counts[source])[:, None]
-    straight = tips[last[start]] + t * (tips[last[source]] - tips[last[start]])
-    axis = axes[last[start]] + t * (axes[last[source]] - axes[last[start]])
-    off = np.linalg.norm(tips - straight, axis=1) > chord_mm
-    off |= np.linalg.norm(axes - axis, axis=1) > AXIS_STEP
-    return np.asarray(np.bincount(source, weights=off, minlength=len(counts)) > 0)
 
 
 def _status(
@@ -196,7 +177,8 @@ def _status(
         rows = np.flatnonzero(follows == number)
         s_mm, _ = nearest(path.tips_mm[rows], contour.nominal)
         station = np.searchsorted(contour.nominal.s_mm, s_mm, side="right") - 1
-        seen[rows] = contour.covered[station] & contour.covered[(station + 1) % len(contour.covered)]
+        after = (station + 1) % len(contour.covered) if contour.nominal.closed else station + 1
+        seen[rows] = contour.covered[station] & contour.covered[np.minimum(after, len(contour.covered) - 1)]
     return tuple(
         Status.APPROACH if not cuts else Status.COVERED if covered else Status.BRIDGED
         for cuts, covered in zip(cutting, seen, strict=True)

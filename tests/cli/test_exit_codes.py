@@ -116,7 +116,19 @@ def test_numbers_that_are_not_finite_never_reach_a_reader(run, files, pipeline):
         (["inspect"], "file"),
         (["inspect", "a.ply", "--role", "tool"], "tool"),
         (["correct", "-q", "-v"], "-q and -v exclude each other"),
-        (["correct", "nowhere.toml"], "nowhere.toml: cannot be read: No such file or directory"),
+        (["correct", "nowhere.toml"], "nowhere.toml: cannot be read: no such file"),
+        (["correct", "job.txt", "--override", "side", "stretch"], "stretch: one job file is taken, and flags"),
+        (["correct", "part.step"], "part.step: this is a part, no job file; give it with --cad"),
+        (
+            ["correct", "part.step", "scan.ply", "trim.apt"],
+            "give the files with --cad, --scan and --path: --cad part.step --scan scan.ply --path trim.apt",
+        ),
+        (
+            ["correct", "scan.ply", "mesh.stl"],
+            "give the files with --cad, --scan and --path: --scan scan.ply --cad mesh.stl",
+        ),
+        (["plugins", "vla3"], "no plug-in 'vla3'; did you mean val3?"),
+        (["settings", "gate"], "no table 'gate'; did you mean gates?"),
         (["correct"], "cad: missing; give the nominal part with --cad FILE"),
     ],
 )

@@ -98,7 +98,6 @@ def test_a_small_hole_beside_a_long_edge_is_not_dropped(synthetic):
     assert (chosen.contour[len(edge) :] == 1).all()
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="with over 50 equal holes each has less than 2 % of the path")
 def test_a_path_over_sixty_holes_follows_all_of_them(synthetic):
     holes = [skin(synthetic, synthetic.circle(5.0, centre=(30.0 * i, 0.0))) for i in range(60)]
     tips = np.vstack([hole.points_mm for hole in holes])

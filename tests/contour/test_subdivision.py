@@ -164,22 +164,17 @@ def test_arcs_hold_equal_lengths_of_seen_contour(edge):
     np.testing.assert_allclose(seen, (edge.length_mm - 90.0) / 5, rtol=1e-9)
 
 
-@pytest.mark.xfail(strict=True, reason="the seam s = 0 is always a split, also where it lies in a gap of the scan")
 def test_a_gap_across_the_seam_lies_within_one_piece(ring):
     gaps = np.array([[0.0, 30.0], [ring.length_mm - 30.0, ring.length_mm]])
     splits = subdivide(ring, 8, 0.3, NONE, gaps).splits_mm
     assert not ((splits < 29.9) | (splits > ring.length_mm - 29.9)).any()
 
 
-@pytest.mark.xfail(strict=True, reason="a bend that lies in a gap becomes a split there")
 def test_a_bend_within_a_gap_does_not_divide_it(ring):
     gaps = np.array([[100.0, 160.0]])
     assert len(splits_in_gaps(subdivide(ring, 8, 0.3, np.array([130.0]), gaps), gaps)) == 0
 
 
-@pytest.mark.xfail(
-    strict=True, reason="s_mm[-1] (a running sum) may exceed length_mm (numpy's pairwise sum) by rounding: weight 0 / 0"
-)
 def test_the_last_station_of_an_open_contour_has_a_weight():
     for seed in range(50):
         x = np.sort(np.random.default_rng(seed).uniform(0.0, 500.0, 700))

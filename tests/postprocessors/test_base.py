@@ -1,12 +1,16 @@
+import ast
+import dataclasses
 import doctest
 import importlib
+import inspect
+import itertools
 import pkgutil
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import pytest
-from post_programs import path_of, program_of, simple_program, straight_program
+from post_programs import NASTY, path_of, program_of, simple_program, straight_program
 
 import sicp_postprocessors
 from sicp_cam.errors import JobError, OutputError, PathError
@@ -14,9 +18,12 @@ from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind
 from sicp_postprocessors.base import LinePostprocessor, Postprocessor
 from sicp_postprocessors.checks import common_findings, event_findings, move_place, stretch_findings
+from sicp_postprocessors.gcode import GCode
 from sicp_postprocessors.numbers import fixed, rounded
-from sicp_postprocessors.options import build_options, outside
-from sicp_postprocessors.text import ascii_line, ascii_lines, ascii_name, file_stem
+from sicp_postprocessors.options import THIS_POST, build_options, flag, outside
+from sicp_postprocessors.path_csv import PathCsv
+from sicp_postprocessors.text import ascii_line, ascii_lines, ascii_name, counted, file_stem
+from sicp_postprocessors.val3 import Val3
 
 
 @pytest.mark.parametrize("module", [m.name for m in pkgutil.iter_modules(sicp_postprocessors.__path__)])
@@ -79,6 +86,10 @@ class TestText:
         assert stem[0] not in ".- " and stem[-1] not in ". "
         assert stem.split(".")[0].lower() not in ("con", "nul")
 
+    @pytest.mark.parametrize(("number", "text"), [(0, "0 points"), (1, "1 point"), (2, "2 points")])
+    def test_counts_are_in_singular_or_plural(self, number, text):
+        assert counted(number, "point") == text
+
     @pytest.mark.parametrize("name", ["9x", "é😀", "", "_", "a b-c", "x" * 40])
     def test_names_of_a_controller(self, name):
         assert ascii_name(name, 15).isalnum()
@@ -120,6 +131,27 @@ class TestOptions:
     def test_wrong_values_are_refused_by_name(self, name, value):
         with pytest.raises(JobError, match=f"'{name}'"):
             build_options("p", Everything, {name: value})
+
+    @pytest.mark.parametrize("word", ["b", "B", " b "])
+    def test_words_are_taken_in_any_case_and_kept_as_the_post_knows_them(self, word):
+        assert build_options("p", Everything, {"kind": word}).kind == "b"
+
+    def test_a_problem_names_the_flag_of_the_post_that_has_it(self):
+        @dataclass(frozen=True)
+        class Broken:
+            def __post_init__(self):
+                raise JobError(f"give {flag(THIS_POST, 'size', '1')}")
+
+        with pytest.raises(JobError, match=r"^post cell_2: give --set post\.cell_2\.size=1$"):
+            build_options("cell_2", Broken, {})
+
+    def test_one_number_is_singular(self):
+        @dataclass(frozen=True)
+        class One:
+            size: tuple[float] = (1.0,)
+
+        with pytest.raises(JobError, match="must be 1 number, not"):
+            build_options("p", One, {"size": "1,2"})
 
     def test_all_problems_are_told_at_once(self):
         with pytest.raises(JobError) as caught:
@@ -178,11 +210,20 @@ class TestChecks:
         assert [f.where for f in findings] == ["before move 0, line 5, and 1 more", "before move 1, line 6"]
         assert all(f.code == 610 and f.level is Level.WARN and "\n" not in f.message for f in findings)
 
+    def test_an_event_without_text_is_told_by_its_kind(self):
+        (finding,) = event_findings(
+            straight_program(2, events=(Event(0, EventKind.COOLANT, 1.0),)).path, {EventKind.COOLANT}, "why"
+        )
+        assert finding.message == "coolant is not written: why"
+
     def test_places(self):
-        path = path_of(np.eye(3), [[0, 0, 1]] * 3, lines=[0, 5, 6])
+        path = path_of(np.eye(3).repeat(2, 0)[:4], [[0, 0, 1]] * 4, lines=[0, 5, 6, 6])
         assert move_place(path, 0) == "move 0"
+        assert move_place(path, 1) == "move 1, line 5"
         assert move_place(path, 1, 2) == "moves 1 to 2, lines 5 to 6"
-        assert stretch_findings(path, np.array([False] * 3), 1, Level.INFO, "x") == []
+        assert move_place(path, 2, 3) == "moves 2 to 3, line 6"
+        assert move_place(path, 0, 3) == "moves 0 to 3"
+        assert stretch_findings(path, np.array([False] * 4), 1, Level.INFO, "x") == []
 
 
 class Plain(LinePostprocessor):
@@ -191,8 +232,16 @@ class Plain(LinePostprocessor):
     suffix = ".txt"
     line_text = "line"
 
+    comment_drop = "!"
+
     def begin(self, program):
         yield "begin"
+
+    def comment(self, text):
+        return f"# {text}"
+
+    def setup(self, program):
+        yield "setup"
 
     def move(self, move, previous):
         yield f"{move.index} after {previous.index if previous else None}"
@@ -208,7 +257,36 @@ class TestTemplate:
     def test_moves_and_events_come_in_order(self):
         events = (Event(2, EventKind.STOP), Event(0, EventKind.STOP), Event(1, EventKind.OTHER))
         (content,) = Plain().write(straight_program(2, events=events)).values()
-        assert content.decode().split("\n") == ["begin", "line", "0 after None", "1 after 0", "line", "end", ""]
+        head = ["begin", "# porthole", "# not a safety function: verify at reduced speed", "setup"]
+        assert content.decode().split("\n") == [*head, "line", "0 after None", "1 after 0", "line", "end", ""]
+
+    def test_the_head_holds_notes_and_remarks_as_plain_comments(self):
+        class Remarking(Plain):
+            def remarks(self, program):
+                yield "tool tip! control"
+
+        program = straight_program(2, notes=("made! by", NASTY), name="a\nb")
+        (content,) = Remarking().write(program).values()
+        head = content.decode("ascii").split("\n")[1:-4]
+        assert head[:2] == ["# a b", "# made by"] and "Robots" in head[2]
+        assert head[3:] == ["# not a safety function: verify at reduced speed", "# tool tip control", "setup"]
+
+    @pytest.mark.parametrize("comment", ["", "#", "# verify"])
+    def test_a_post_whose_comments_lose_the_safety_line_is_stopped(self, comment):
+        class Silent(Plain):
+            def comment(self, text):
+                return comment
+
+        with pytest.raises(OutputError, match="post plain writes comments without their text"):
+            Silent().write(straight_program(2))
+
+    def test_a_post_without_comment_syntax_cannot_be_made(self):
+        class Unfinished(LinePostprocessor):
+            name, summary, suffix = "unfinished", "for the tests", ".txt"
+            begin = move = event = end = Plain.begin
+
+        with pytest.raises(TypeError, match="comment"):
+            Unfinished()
 
     @pytest.mark.parametrize("text", ["two\nlines", "é", "\x1b"])
     def test_a_hook_that_returns_no_plain_line_is_stopped(self, text):
@@ -238,3 +316,17 @@ class TestTemplate:
 
         with pytest.raises(OutputError, match="outside its folder"):
             Escaping().write(straight_program(2))
+
+
+@pytest.mark.parametrize("post", [Val3, GCode, PathCsv])
+def test_every_option_has_a_docstring_under_its_field(post):
+    """`sicp-cam plugins NAME` reads them from the source: a text of its own for each, that ends as a sentence."""
+    body = ast.parse(inspect.getsource(post.Options)).body[0].body
+    told = {
+        field.target.id: text.value.value
+        for field, text in itertools.pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+    }
+    assert list(told) == [field.name for field in dataclasses.fields(post.Options)]
+    assert all(text.endswith(".") and not text.startswith("See ") and "\n" not in text for text in told.values())
+    assert len(set(told.values())) == len(told)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -111,6 +112,13 @@ def test_nasty_text_leaves_val3_well_formed():
     assert app.name == "HelloRobotsNext"
     assert sum("Hello" in line for line in app.code["start"]) == 5
     assert all(line.startswith("//") for line in app.code["start"] if "Hello" in line)
+
+
+@pytest.mark.parametrize("post", POSTS[1:], ids=lambda p: f"{p.name}-{getattr(p.options, 'orientation', '')}")
+def test_every_program_says_once_what_made_it_and_that_it_is_no_safety_function(post):
+    text = b"".join(post.write(simple_program()).values()).decode("utf-8-sig")
+    assert re.search(r"^\s*(\(|;|//) ?porthole\)?\r?$", text, re.MULTILINE)
+    assert text.count("not a safety function") == text.count("corrected by sicp_cam") == 1
 
 
 @EACH_POST

@@ -122,6 +122,53 @@ def test_options_out_of_range(options):
         GCode(options)
 
 
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ({}, "(Fanuc G43.5 type 2: I J K points from the tip to the holder)"),
+        ({"orientation": "rotary"}, "(Fanuc G43.4 type 1: rotary words AC, head-head)"),
+        ({"orientation": "ROTARY", "kinematics": "bc"}, "(Fanuc G43.4 type 1: rotary words BC, head-head)"),
+        ({"orientation": "siemens"}, "; Siemens 840D TRAORI: A3 B3 C3 points from the tip to the holder"),
+        ({"orientation": "rotary", "tcp_on": "M428"}, "(tool tip control M428: rotary words AC, head-head)"),
+        ({"tcp_on": "G43.5{tool}"}, "(tool tip control G43.5: I J K points from the tip to the holder)"),
+    ],
+)
+def test_the_head_names_the_control_and_what_its_words_mean(options, line):
+    lines = text_of(GCode(options).write(simple_program())).splitlines()
+    assert line in lines
+    assert sum("G43" in x or "TRAORI" in x or "M428" in x for x in lines if x[0] in "(;") == 1
+
+
+def test_the_head_stands_between_the_program_number_and_the_modes():
+    lines = text_of(GCode({"program_number": 5, "work_offset": "G55"}).write(straight_program(2))).splitlines()
+    assert lines[:3] == ["%", "O0005", "(porthole)"]
+    modes = lines.index("G21 G90 G94 G17 G40")
+    assert all(line.startswith("(") for line in lines[2:modes]) and lines[modes + 1 : modes + 3] == ["G55", "G43.5"]
+    assert "(coordinates in the scan frame: the work offset G55 must hold it)" in lines[2:modes]
+
+
+@pytest.mark.parametrize(("moved", "frame"), [(False, "scan"), (True, "part")])
+def test_a_program_without_work_offset_says_what_the_active_one_must_hold(moved, frame):
+    pose = np.eye(4)
+    pose[0, 3] = 5.0 * moved
+    program = simple_program(T_scan_program=pose)
+    (told,) = [f for f in GCode().preflight(program) if f.code == 623]
+    assert told.level is Level.INFO and f"those of the {frame} frame" in told.message
+    assert told.message.endswith("--set post.gcode.work_offset=G54")
+    assert f"(coordinates in the {frame} frame: the active work offset must hold it)" in text_of(GCode().write(program))
+    assert [f for f in GCode({"work_offset": "G54"}).preflight(program) if f.code == 623] == []
+
+
+def test_flags_carry_the_name_of_the_post():
+    class Cell(GCode):
+        name = "cell_2"
+
+    post = Cell({"orientation": "rotary", "tilt_limits_deg": "-10,10"})
+    told = [f.message for f in post.preflight(simple_program())]
+    assert any("--set post.cell_2.work_offset=G54" in message for message in told)
+    assert any("--set post.cell_2.tilt_limits_deg=lowest,highest" in message for message in told)
+
+
 class TestRotary:
     def test_known_angles(self):
         axes = np.array([[0.0, -0.5, np.sqrt(0.75)], [0.5, 0.0, np.sqrt(0.75)]])
@@ -151,6 +198,16 @@ class TestRotary:
     def test_moves_at_the_pole_take_the_turn_that_follows(self):
         axes = np.vstack([[[0.0, 0.0, 1.0]] * 3, leaning_axes(2, turn=0.0)])
         assert np.allclose(head_angles(axes, "AC", 1e-3).turn_deg, 90.0)
+
+    @pytest.mark.parametrize("lean", [-1e-9, 0.0, 1e-9])
+    @pytest.mark.parametrize("kinematics", ["AC", "BC"])
+    @pytest.mark.parametrize("sign", [1.0, -1.0])
+    def test_an_axis_that_turns_round_between_the_poles_is_followed(self, kinematics, lean, sign):
+        axes = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [lean, 0.0, 1.0], [0.0, 1.0, 0.0], [lean, lean, -1.0]])
+        axes[1:, 2] *= sign
+        angles = head_angles(axes, kinematics, 1e-3)
+        assert axis_errors_deg(axes, axes_from_angles(angles.tilt_deg, angles.turn_deg, kinematics)).max() < 1e-3
+        assert np.abs(angles.tilt_deg).max() <= 180.0
 
     def test_hold_is_told_with_its_error(self):
         axes = leaning_axes(5, lean=1e-4, turn=3.0)

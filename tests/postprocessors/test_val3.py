@@ -11,6 +11,7 @@ from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind
 from sicp_postprocessors.val3 import Val3, application_name
 from sicp_postprocessors.val3_code import programs_of
+from sicp_postprocessors.val3_motion import path_angles
 from sicp_postprocessors.val3_poses import (
     angles_from_axes,
     euler_angles,
@@ -73,6 +74,44 @@ class TestEuler:
         assert np.allclose(-rotation_matrices(carried)[:, :, 2], axes)
 
 
+class TestFrame:
+    POSE = pose_from_six((100.0, -20.0, 30.0, 10.0, 20.0, 30.0))
+
+    def test_frame_is_cell_times_program_frame(self):
+        cell = (500.0, 1.0, 2.0, -15.0, 90.0, 5.0)
+        app = load_val3(Val3({"cell": cell}).write(simple_program(T_scan_program=self.POSE)))
+        assert np.abs(app.pose("fPart") - pose_from_six(cell) @ self.POSE).max() < 1e-6
+        assert app.data["fPart"][0]["fatherId"] == "world[0]"
+
+    def test_cell_measured_from_the_base_plate_is_lowered_to_the_shoulder(self):
+        options = {"world_origin": "base_plate", "shoulder_height_mm": 375}
+        app = load_val3(Val3(options).write(simple_program(T_scan_program=self.POSE)))
+        assert np.allclose(app.pose("fPart")[:3, 3], [100.0, -20.0, 30.0 - 375.0])
+
+    def test_tool_pose(self):
+        app = load_val3(Val3({"tool": (1, 2, 150, 0, 0, 45)}).write(straight_program(2)))
+        assert app.data["tTool"][0] == {
+            "x": "1", "y": "2", "z": "150", "rx": "0", "ry": "0", "rz": "45",
+            "fatherId": "flange[0]", "ioLink": "valve1",
+        }  # fmt: skip
+
+    def test_far_frames_are_refused(self):
+        with pytest.raises(PathError, match=r"fPart .*--set post\.val3\.cell="):
+            Val3({"cell": "1e8,0,0,0,0,0"}).write(simple_program())
+
+    @pytest.mark.parametrize("spin", ["fixed", "transport"])
+    def test_an_axis_that_turns_round_is_followed(self, spin):
+        axes = np.array([[0, 0, 1], [0, -1, 0], [1, 0, 0], [-1, 1e-9, 0], [-1, -1e-9, 0]])
+        program = program_of(path_of(np.eye(5)[:, :3], axes, 600.0, [True] + [False] * 4))
+        _, result = read_val3(Val3({"spin": spin}).write(program))
+        assert axis_error_deg(np.array(result.axes), axes) < 1e-3
+
+    def test_angles_that_miss_the_axis_are_refused(self, monkeypatch):
+        monkeypatch.setattr("sicp_postprocessors.val3.path_angles", lambda *a: path_angles(*a) + 0.01)
+        with pytest.raises(PathError, match="moves 0 to 5, lines 10 to 15: rx, ry, rz miss the tool axis"):
+            Val3().write(simple_program())
+
+
 class TestProgram:
     @pytest.mark.parametrize(
         "options",
@@ -125,7 +164,9 @@ class TestProgram:
         moves = [value["mdesc"] for kind, value in result.actions if kind in MOVES]
         assert [m["tmax"] for m in moves] == ["300", "33.333333", "33.333333", "15", "15", "300"]
         assert [m["vel"] for m in moves] == ["10"] + ["100"] * 5
-        assert len(app.data["mCut"]) == 2
+        assert {(m["tmax"], m["blend"]) for m in app.data["mCut"]} == {
+            ("33.333333", "Cartesian"), ("33.333333", "off"), ("15", "off")
+        }  # fmt: skip
 
     def test_first_run_caps_every_speed_and_blends_nothing(self):
         post = Val3({"first_run": True, "first_run_mm_s": 20, "blend": "Cartesian"})
@@ -166,35 +207,55 @@ class TestProgram:
             assert words in head
         assert "at the shoulder" in " ".join(load_val3(Val3().write(simple_program())).code["start"])
 
+    SHOULDER = "the robot's world is at the shoulder (axes 1 and 2), not on the base plate"
+
+    @pytest.mark.parametrize(
+        ("pose", "options", "frame", "world"),
+        [
+            (
+                np.eye(4),
+                {},
+                "fPart is the pose of the scan frame; no cell is given, so the scan frame is taken as the "
+                "robot's world",
+                SHOULDER,
+            ),
+            (
+                TestFrame.POSE,
+                {},
+                "fPart is the pose of the part in the scan frame; no cell is given, so the scan frame is taken as the "
+                "robot's world",
+                SHOULDER,
+            ),
+            (
+                np.eye(4),
+                {"cell": "1,2,3,0,0,0"},
+                "fPart is the pose of the scan frame in the robot's world: the option cell",
+                f"{SHOULDER}; cell was measured from the shoulder",
+            ),
+            (
+                TestFrame.POSE,
+                {"cell": "1,2,3,0,0,0", "world_origin": "base_plate", "shoulder_height_mm": 375},
+                "fPart is the pose of the part in the robot's world: the option cell times its pose in the scan frame",
+                f"{SHOULDER}, which is 375 mm below; cell was measured from there, and fPart is shifted by that",
+            ),
+            (
+                np.eye(4),
+                {"world_origin": "base_plate", "shoulder_height_mm": 375},
+                "so the scan frame is taken as the robot's world",
+                f"{SHOULDER}, which is 375 mm below; the scan frame is taken to lie there, and fPart is shifted by "
+                "that",
+            ),
+        ],
+        ids=["scan", "part", "scan, cell", "part, cell from the plate", "plate without cell"],
+    )
+    def test_the_head_says_what_the_frame_is(self, pose, options, frame, world):
+        program = straight_program(2, T_scan_program=pose)
+        head = " ".join(x.removeprefix("// ") for x in load_val3(Val3(options).write(program)).code["start"])
+        assert f"{frame} {world} points: mm" in head
+
     def test_stop_switches_off(self):
         assert load_val3(Val3().write(simple_program())).code["stop"] == ["doSpindle=false", "doCoolant=false"]
         assert load_val3(Val3().write(straight_program(2))).code["stop"] == []
-
-
-class TestFrame:
-    POSE = pose_from_six((100.0, -20.0, 30.0, 10.0, 20.0, 30.0))
-
-    def test_frame_is_cell_times_program_frame(self):
-        cell = (500.0, 1.0, 2.0, -15.0, 90.0, 5.0)
-        app = load_val3(Val3({"cell": cell}).write(simple_program(T_scan_program=self.POSE)))
-        assert np.abs(app.pose("fPart") - pose_from_six(cell) @ self.POSE).max() < 1e-6
-        assert app.data["fPart"][0]["fatherId"] == "world[0]"
-
-    def test_cell_measured_from_the_base_plate_is_lowered_to_the_shoulder(self):
-        options = {"world_origin": "base_plate", "shoulder_height_mm": 375}
-        app = load_val3(Val3(options).write(simple_program(T_scan_program=self.POSE)))
-        assert np.allclose(app.pose("fPart")[:3, 3], [100.0, -20.0, 30.0 - 375.0])
-
-    def test_tool_pose(self):
-        app = load_val3(Val3({"tool": (1, 2, 150, 0, 0, 45)}).write(straight_program(2)))
-        assert app.data["tTool"][0] == {
-            "x": "1", "y": "2", "z": "150", "rx": "0", "ry": "0", "rz": "45",
-            "fatherId": "flange[0]", "ioLink": "valve1",
-        }  # fmt: skip
-
-    def test_far_frames_are_refused(self):
-        with pytest.raises(PathError, match="fPart"):
-            Val3({"cell": "1e8,0,0,0,0,0"}).write(simple_program())
 
 
 class TestSplit:
@@ -229,7 +290,7 @@ class TestSplit:
 
 class TestBlend:
     def moves(self, program, **options):
-        _, result = read_val3(Val3({"blend": "Cartesian", **options}).write(program))
+        _, result = read_val3(Val3(options).write(program))
         return [value["mdesc"] for kind, value in result.actions if kind in MOVES]
 
     def test_never_more_than_half_of_the_shorter_neighbour(self):
@@ -250,11 +311,86 @@ class TestBlend:
         blends = [m["blend"] for m in self.moves(program)]
         assert [i for i, b in enumerate(blends) if b == "Cartesian"] == [1, 3, 4, 5]
 
+    def test_a_finely_divided_contour_runs_through_by_default(self):
+        events = (Event(200, EventKind.DWELL, 1.0),)
+        moves = self.moves(straight_program(520, spacing=2.0, events=events))
+        assert [i for i, m in enumerate(moves) if m["blend"] == "off"] == [0, 199, 519]
+        assert {(m["leave"], m["reach"]) for m in moves if m["blend"] == "Cartesian"} == {("0.5", "0.5")}
+        assert [f.code for f in Val3().preflight(straight_program(520, spacing=2.0)) if f.code in (639, 640)] == []
+
+    def test_a_large_blend_is_made_smaller_and_not_left_out(self):
+        moves = self.moves(straight_program(20, spacing=0.01), blend_mm=100)
+        assert {m["blend"] for m in moves[1:-1]} == {"Cartesian"}
+        assert all(0.001 <= float(m["reach"]) <= 0.005 for m in moves[1:-1])
+
+    @pytest.mark.parametrize("word", ["cartesian", "CARTESIAN", "Cartesian"])
+    def test_the_word_is_taken_in_any_case_and_written_in_one(self, word):
+        assert self.moves(straight_program(4), blend=word)[1]["blend"] == "Cartesian"
+
+    def test_the_head_tells_of_blending_where_there_is_some(self):
+        def blended(**options):
+            return [x for x in load_val3(Val3(options).write(straight_program(9))).code["start"] if "blended" in x]
+
+        assert blended(blend_mm=0.25) == ["// points between cuts are blended, leave and reach 0.25 mm at most"]
+        assert blended(blend="off") == blended(first_run=True) == []
+
+    @pytest.mark.parametrize(
+        ("options", "level", "flag"),
+        [
+            ({"blend": "off"}, Level.WARN, "--set post.val3.blend=Cartesian"),
+            ({"first_run": True}, Level.INFO, "--set post.val3.first_run=false"),
+            ({"first_run": True, "blend": "off"}, Level.INFO, "--set post.val3.first_run=false"),
+        ],
+        ids=str,
+    )
+    def test_stops_within_cuts_are_counted(self, options, level, flag):
+        events = (Event(100, EventKind.DWELL, 1.0), Event(101, EventKind.COMMENT, 0.0, "x"))
+        program = straight_program(520, events=events)
+        (told,) = [f for f in Val3(options).preflight(program) if f.code == 639]
+        assert told.level is level and "stops at 517 points" in told.message and told.message.endswith(flag)
+        assert told.where == "moves 1 to 518, lines 11 to 528"
+        assert 639 not in codes(Val3(options), straight_program(12))
+
+    def test_points_too_close_to_blend_are_told(self):
+        tips = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 0, 0], [3, 0, 0], [4, 0, 0]], float)
+        program = program_of(path_of(tips, [[0, 0, 1]] * 6, 600.0, [True] + [False] * 5))
+        (told,) = [f for f in Val3().preflight(program) if f.code == 639]
+        assert (told.level, told.where) == (Level.INFO, "moves 2 to 3, lines 12 to 13")
+        assert "stops at 2 points" in told.message and "double points" in told.message
+        single = np.delete(tips, 3, axis=0)
+        assert 639 not in codes(Val3(), program_of(path_of(single, [[0, 0, 1]] * 5, 600.0, [True] + [False] * 4)))
+
+    @pytest.mark.parametrize("turn_deg", [20.0, 90.0, 150.0])
+    def test_cut_corners_are_told_with_a_blend_that_keeps_them(self, turn_deg):
+        turn = np.radians(turn_deg)
+        tips = np.array([[-20, 0, 0], [-10, 0, 0], [0, 0, 0], [10 * np.cos(turn), 10 * np.sin(turn), 0]])
+        program = program_of(path_of(tips, [[0, 0, 1]] * 4, 600.0, [True] + [False] * 3))
+        (told,) = [f for f in Val3().preflight(program) if f.code == 640]
+        assert (told.level, told.where) == (Level.INFO, "move 2, line 12")
+        assert f"up to {0.5 * np.sin(turn / 2):.2f} mm" in told.message
+        enough = re.search(r"--set post\.val3\.blend_mm=([0-9.]+) ", told.message)[1]
+        assert 0.04 < float(enough) * np.sin(turn / 2) <= 0.05
+        assert 640 not in codes(Val3({"blend_mm": enough}), program)
+
 
 class TestSpindleAndTools:
     def test_defaults_tell_what_is_not_set(self):
         found = codes(Val3(), simple_program())
         assert found == [610, 630, 631, 632, 632, 634]
+
+    def test_what_is_not_set_is_told_with_the_flag_that_sets_it(self):
+        class Cell(Val3):
+            name = "cell_2"
+
+        told = {f.code: f.message for f in Cell().preflight(simple_program())}
+        assert "--set post.cell_2.tool=x,y,z,rx,ry,rz," in told[630]
+        assert told[631].endswith("--set post.cell_2.cell=x,y,z,rx,ry,rz")
+        assert "--set post.cell_2.spindle_speed=num" in told[634]
+        links = [f.message for f in Cell().preflight(simple_program()) if f.code == 632]
+        for kind, message in zip(("spindle", "coolant"), links, strict=True):
+            assert f"--set post.cell_2.{kind}_link=OUTPUT" in message
+        plate = {"world_origin": "base_plate", "shoulder_height_mm": 375}
+        assert any("taken as the robot's base plate" in f.message for f in Val3(plate).preflight(simple_program()))
 
     def test_a_complete_cell_is_quiet(self):
         options = {
@@ -270,7 +406,9 @@ class TestSpindleAndTools:
 
     def test_counter_clockwise_needs_an_output(self):
         program = straight_program(3, events=(Event(1, EventKind.SPINDLE, -9000.0, line=4),))
-        with pytest.raises(PathError, match=r"before move 1, line 4: .*counter-clockwise.*spindle_ccw_link"):
+        with pytest.raises(
+            PathError, match=r"before move 1, line 4: .*counter-clockwise.*--set post\.val3\.spindle_ccw_link="
+        ):
             Val3().write(program)
         app, result = read_val3(Val3({"spindle_ccw_link": "B\\%Q1"}).write(program))
         outputs = [value for kind, value in result.actions if kind == "output"]
@@ -282,6 +420,16 @@ class TestSpindleAndTools:
         options = {"spindle_speed": "aio", "spindle_speed_link": "B\\%A0", "spindle_speed_scale": 0.001}
         app, result = read_val3(Val3(options).write(simple_program()))
         assert ("analog", ("aoSpindle", "12")) in result.actions and app.types["aoSpindle"] == "aio"
+
+    def test_an_analog_speed_without_its_scale_is_refused(self):
+        """18000 rev/min must not become 18000 volts."""
+        with pytest.raises(JobError, match=r"one rev/min; give --set post\.val3\.spindle_speed_scale="):
+            Val3({"spindle_speed": "aio", "spindle_speed_link": "B\\%A0"})
+        with pytest.raises(JobError) as caught:
+            Val3({"spindle_speed": "AIO"})
+        assert len(caught.value.problems) == 2
+        _, result = read_val3(Val3({"spindle_speed": "num"}).write(simple_program()))
+        assert ("number", ("nSpindle", "12000")) in result.actions
 
     def test_a_later_tool_stops_the_spindle_and_waits(self):
         events = (
@@ -318,6 +466,7 @@ class TestSpindleAndTools:
         program = program_of(path_of(np.eye(5)[:, :3], axes, 600.0, [True] + [False] * 4))
         told = [f for f in Val3().preflight(program) if f.code == 635]
         assert [f.where for f in told] == ["moves 1 to 4, lines 11 to 14"] and told[0].level is Level.WARN
+        assert told[0].message.endswith("--set post.val3.spin=transport")
         assert 635 not in codes(Val3({"spin": "transport"}), program)
 
 
@@ -335,7 +484,8 @@ def test_application_names(name, written):
     "options",
     [{"world_origin": "base_plate"}, {"shoulder_height_mm": 5}, {"spindle_speed": "aio"}, {"decimals": 3},
      {"version": 's7"><x'}, {"tool": "1,2,3"}, {"max_moves_per_program": 0}, {"approach_vel_percent": 0},
-     {"blend": "cartesian"}, {"spindle_link": "a\x01b"}],
+     {"blend": "joint"}, {"spindle_speed": "aio", "spindle_speed_link": "A", "spindle_speed_scale": 0},
+     {"spindle_link": "a\x01b"}],
 )  # fmt: skip
 def test_options_that_do_not_fit(options):
     with pytest.raises(JobError):

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "postprocessors"))
 from post_programs import path_of, program_of
 from post_reread import axis_error_deg, read_csv, read_gcode, read_val3
 
+from sicp_cam.model import Event, EventKind
 from sicp_postprocessors.gcode import GCode
 from sicp_postprocessors.path_csv import PathCsv
 from sicp_postprocessors.text import ascii_line, ascii_name, file_stem
@@ -55,6 +56,28 @@ def test_poses_read_back(reader, poses, feed):
     assert axis_error_deg(np.array(result.axes), axes) < 1e-3
     assert result.rapid == rapid.tolist()
     assert np.allclose(np.array(result.feeds)[1:], feed, rtol=0, atol=1e-3)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    steps=st.lists(st.sampled_from([0.0, 1e-4, 0.003, 0.02, 0.4, 0.9, 2.0, 30.0]), min_size=3, max_size=20),
+    rapid=st.lists(st.booleans(), min_size=21, max_size=21),
+    events=st.lists(st.tuples(st.integers(0, 20), st.sampled_from(list(EventKind))), max_size=3),
+    blend_mm=st.sampled_from([0.001, 0.05, 0.5, 20.0]),
+)
+def test_blends_never_meet_and_never_skip_a_point_that_must_be_reached(steps, rapid, events, blend_mm):
+    x = np.cumsum([0.0, *steps])
+    told = [Event(min(before, len(x)), kind, 0.0, "x") for before, kind in events]
+    path = path_of(np.column_stack([x, 0 * x, 0 * x]), [[0, 0, 1]] * len(x), 600.0, rapid[: len(x)], told)
+    _, result = read_val3(Val3({"blend_mm": blend_mm}).write(program_of(path)))
+    moves = [value["mdesc"] for kind, value in result.actions if kind in ("movej", "movel")]
+    waits = {e.before_move - 1 for e in told if e.kind not in (EventKind.COMMENT, EventKind.OTHER)}
+    for i, (move, run_on) in enumerate(zip(moves, np.append(~path.rapid[1:], False), strict=True)):
+        reach = float(move["reach"])
+        assert move["leave"] == move["reach"] and move["blend"] == ("Cartesian" if reach else "off")
+        exact = i in waits or i == 0 or path.rapid[i] or not run_on
+        room = 0.0 if exact else min(blend_mm, steps[i - 1] / 2, steps[i] / 2)
+        assert reach <= room + 1e-9 and (reach > room / 2 - 1e-6 or room < 0.002)
 
 
 @settings(deadline=None, max_examples=100)

@@ -15,6 +15,7 @@ from sicp_cam.registration.result import RegisteredContour, Residuals
 from sicp_cam.rigid_motion import apply, from_parts, rotate
 from sicp_cam.toolpath.gates import path_gates
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
+from sicp_cam.toolpath.steps import divided, feed_steps
 from sicp_cam.toolpath.transfer import correct_path
 
 FEW = settings(max_examples=40, deadline=None)
@@ -83,9 +84,11 @@ def random_pose(seed):
 
 
 def corrected(path, contour, T, **options):
-    n = len(path)
-    assignment = Assignment(np.zeros(n, np.int64), np.where(path.rapid, 100.0, 5.0), (0,))
-    return correct_path(path, assignment, [contour], T, ToolPathSettings(**options), 20.0)
+    settings = ToolPathSettings(**options)
+    steps = divided(path, feed_steps(path, settings.step_mm))
+    rapid = path.rapid[steps.source]
+    assignment = Assignment(np.zeros(len(rapid), np.int64), np.where(rapid, 100.0, 5.0), (0,))
+    return correct_path(path, steps, assignment, [contour], T, settings, 20.0)
 
 
 @given(seeds, seeds, seeds)

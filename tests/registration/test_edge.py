@@ -58,9 +58,6 @@ def test_the_edge_is_found_without_the_bias_of_the_rim(synthetic, hole, sheet, c
     assert np.mean(rim_biases) > 4.0 * np.abs(np.mean(biases))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="where cells thin the points the edge is denser than the interior: -0.18 spacing"
-)
 def test_thinning_by_voxels_does_not_shift_the_edge(synthetic, hole, sheet, curve):
     found = measure(curve, surface_of(synthetic, [hole], sheet, sampling="voxels"), reach_mm=REACH)
     assert abs(found.depth_mm[found.covered].mean()) < 0.1 * SPACING
@@ -170,7 +167,6 @@ def test_the_edge_of_a_flange_of_ten_spacings_has_no_bias(synthetic):
     assert abs(found.depth_mm[found.covered].mean()) < 0.08 * SPACING
 
 
-@pytest.mark.xfail(strict=True, reason="the interior density is counted to 7 spacings where the flange has only 5")
 def test_the_edge_of_a_narrow_flange_is_right_or_not_called_covered(synthetic):
     found = flange(synthetic, 10.0)
     assert np.abs(found.depth_mm[found.covered]).mean() < 0.4

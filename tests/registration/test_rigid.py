@@ -154,7 +154,6 @@ def test_cropping_keeps_the_band_with_its_triangles_and_normals(synthetic):
     assert len(part.faces) > 0.4 * len(scan.faces) * 20.0 / 60.0
 
 
-@pytest.mark.xfail(strict=True, reason="the box before the distance test has a margin of 1.0, not 1.1 times the reach")
 def test_the_band_does_not_depend_on_how_the_scan_lies_to_the_axes(synthetic):
     hole = synthetic.circle(60.0)
     curve = framed(synthetic.contour(hole, synthetic.dome(150.0, 150.0)))

@@ -57,9 +57,6 @@ def test_a_common_move_across_the_contour_is_followed_by_every_piece(flat):
     assert np.median(np.abs(across[straight])) < 0.02
 
 
-@pytest.mark.xfail(
-    strict=True, reason="what holds against sliding (SLIDE_SHARE) also holds a piece with a corner back: it falls short"
-)
 def test_a_corner_follows_a_common_move_too(flat):
     nominal, _, s = flat
     targets = shifted_targets(flat, lambda points: points + np.array([1.0, -0.6, 0.0]))

@@ -57,7 +57,7 @@ def test_document_puts_pictures_in_reading_order(result) -> None:
     assert made.pictures[1].caption.startswith("Contour 10: distance between scan and contour")
     assert "how well the curve fits the scan, not how true it is" in made.pictures[1].caption
     assert made.pictures[4].caption.startswith("Contour 1: what the correction adds")
-    assert "Ticks at the top are the borders of the segments. Each segment moves as one" in made.pictures[4].caption
+    assert "are the borders of the segments. Each segment moves as one" in made.pictures[4].caption
     assert made.pictures[-1].caption == "own.png"
     assert made.verdict == Verdict.WARNINGS
     assert made.reasons[0] == "Gate axis_deg failed and was overridden: 16.25 against the limit 15."

@@ -10,6 +10,7 @@ from sicp_cam.contour.frames import FramedCurve, moved, orthonormal
 from sicp_cam.model import ToolPath
 from sicp_cam.registration.result import RegisteredContour, Residuals
 from sicp_cam.toolpath.settings import ToolPathSettings
+from sicp_cam.toolpath.steps import divided, feed_steps
 from sicp_cam.toolpath.transfer import correct_path
 
 NONE = np.zeros((0, 3))
@@ -76,9 +77,11 @@ def corrected(tool_path, contours, T=None, *, follows=None, distance_mm=None, on
     n = len(tool_path)
     which = np.zeros(n, dtype=np.int64) if follows is None else np.asarray(follows, dtype=np.int64)
     distance = np.zeros(n) if distance_mm is None else np.asarray(distance_mm, dtype=float)
-    assignment = Assignment(which, distance, tuple(range(len(contours))))
+    settings = ToolPathSettings(**settings)
+    steps = divided(tool_path, feed_steps(tool_path, settings.step_mm))
+    assignment = Assignment(which[steps.source], distance[steps.source], tuple(range(len(contours))))
     T = np.eye(4) if T is None else T
-    return correct_path(tool_path, assignment, contours, T, ToolPathSettings(**settings), on_contour_mm)
+    return correct_path(tool_path, steps, assignment, contours, T, settings, on_contour_mm)
 
 
 @pytest.fixture(scope="session")

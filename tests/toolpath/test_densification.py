@@ -52,7 +52,6 @@ def test_a_straight_cut_that_stays_straight_stays_one_move(made):
     assert len(done.corrected) == 2
 
 
-@pytest.mark.xfail(strict=True, reason="the straight mean of two axes is shorter than 1, which is taken for a bend")
 def test_an_axis_that_turns_within_a_cut_does_not_divide_it_where_nothing_is_deformed(made):
     nominal = made.straight()
     source = made.path([[20.0, 0.0, 0.0], [120.0, 0.0, 0.0]], [[0.0, 0.0, 1.0], [0.0, np.sin(0.3), np.cos(0.3)]])

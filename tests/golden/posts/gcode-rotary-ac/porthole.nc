@@ -3,7 +3,9 @@
 (corrected by sicp_cam)
 (gates: all passed)
 (not a safety function: verify at reduced speed)
-(units mm, orientation rotary kinematics AC head-head, dwell in seconds)
+(Fanuc G43.4 type 1: rotary words AC, head-head)
+(units mm, dwell in seconds)
+(coordinates in the scan frame: the active work offset must hold it)
 N10 G21 G90 G94 G17 G40
 N20 G49
 N30 T3 M6

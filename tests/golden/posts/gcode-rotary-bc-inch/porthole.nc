@@ -4,7 +4,9 @@ O0012
 (corrected by sicp_cam)
 (gates: all passed)
 (not a safety function: verify at reduced speed)
-(units inch, orientation rotary kinematics BC head-head, dwell in seconds)
+(Fanuc G43.4 type 1: rotary words BC, head-head)
+(units inch, dwell in seconds)
+(coordinates in the scan frame: the work offset G54 must hold it)
 G20 G90 G94 G17 G40
 G54
 G49

@@ -3,7 +3,9 @@
 ; ]0x bell
 ; - msg,active
 ; not a safety function: verify at reduced speed
-; units mm, orientation siemens, dwell in seconds
+; Siemens 840D TRAORI: A3 B3 C3 points from the tip to the holder
+; units mm, dwell in seconds
+; coordinates in the scan frame: the active work offset must hold it
 G710 G90 G94 G17 G40
 TRAFOOF
 T1 M6

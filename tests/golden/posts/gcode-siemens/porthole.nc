@@ -2,8 +2,10 @@
 ; corrected by sicp_cam
 ; gates: all passed
 ; not a safety function: verify at reduced speed
-; units mm, orientation siemens, dwell in seconds
-; work offset in the scan frame: origin 100 -50 25 mm, rotation rows
+; Siemens 840D TRAORI: A3 B3 C3 points from the tip to the holder
+; units mm, dwell in seconds
+; coordinates in the part frame: the active work offset must hold it
+; its pose in the scan frame: origin 100 -50 25 mm, rotation rows
 ; 0.935754803 -0.302932713 -0.180540077 / 0.283164961 0.950580618
 ; -0.127334575 / 0.210191706 0.068031316 0.975290309
 G710 G90 G94 G17 G40

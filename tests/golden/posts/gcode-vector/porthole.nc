@@ -3,7 +3,9 @@
 (corrected by sicp_cam)
 (gates: all passed)
 (not a safety function: verify at reduced speed)
-(units mm, orientation vector, dwell in seconds)
+(Fanuc G43.5 type 2: I J K points from the tip to the holder)
+(units mm, dwell in seconds)
+(coordinates in the scan frame: the active work offset must hold it)
 G21 G90 G94 G17 G40
 G49
 T3 M6
