@@ -29,6 +29,8 @@ from sicp_cam.units import MM_PER_UNIT
 __all__ = ["PartRegistration", "check_scan_unit", "choice_findings", "choose_contours", "contours_of", "register"]
 
 STEP_MM = 2.0
+CLEARLY_WORSE = 0.3
+"""Logarithm of a size ratio by which a unit must fit worse than the best one not to be named."""
 OTHER_SKIN_MM = 1.0
 """How much nearer another contour must be to be worth a warning."""
 
@@ -194,7 +196,13 @@ def check_scan_unit(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> 
     most = 1.5 * max(_diagonal(part.mesh.vertices_mm), 2.0 * least)
     if least <= size <= most:
         return
-    fitting = [unit for unit, factor in MM_PER_UNIT.items() if unit != "mm" and least <= size * factor <= most]
+    sizes = np.array([_diagonal(part.mesh.vertices_mm), 2.0 * least])
+    off = {
+        unit: float(np.abs(np.log(size * factor / sizes)).min())
+        for unit, factor in MM_PER_UNIT.items()
+        if unit != "mm" and least <= size * factor <= most
+    }
+    fitting = sorted((unit for unit in off if off[unit] <= min(off.values()) + CLEARLY_WORSE), key=lambda u: off[u])
     if fitting:
         options = " or ".join(f"--scan-units {unit}" for unit in fitting)
         raise UnitError(

@@ -195,7 +195,7 @@ def _type(wanted: Any, allowed: Range, count: str = "") -> str:
         return f"list of {_type(parts[0], allowed, 'many')}, separated by commas"
     if origin is tuple:
         return f"{len(parts)} {_type(parts[0], _ANY_NUMBER, 'many')}, separated by commas"
-    words = _TYPES.get(wanted, getattr(wanted, "__name__", str(wanted)))
+    words = _TYPES.get(wanted) or (wanted.__name__ if isinstance(wanted, type) and origin is None else str(wanted))
     return f"{words}{many}{_span(allowed) if wanted in (int, float) else ''}"
 
 

@@ -112,6 +112,18 @@ def test_a_file_can_be_treated_as_if_it_had_another_suffix(distribution):
         plugins.read_scan(Path("part.alpha"), options={"format": 3})
 
 
+def test_reader_and_options_can_be_checked_without_a_file(distribution):
+    distribution("alpha", [(FORMATS, "scan.alpha", "read_scan")])
+    nowhere = Path("nowhere")
+    plugins.check_reader("scan", nowhere / "part.alpha", {"scale": 2.0})
+    plugins.check_reader("scan", nowhere / "part.dat", {"format": "alpha", "skip": True})
+    assert not hasattr(sys.modules["alpha"].read_scan, "told")
+    with pytest.raises(InputError, match=r"part\.dat: no reader for a scan with the suffix '\.dat'"):
+        plugins.check_reader("scan", nowhere / "part.dat")
+    with pytest.raises(JobError, match=r"^scan\.scal: unknown option; did you mean scale\?"):
+        plugins.check_reader("scan", nowhere / "part.alpha", {"scal": 2.0})
+
+
 def test_the_roles_of_a_file_are_those_that_can_read_it():
     assert plugins.roles(Path("a.stl")) == ("scan", "part")
     assert plugins.roles(Path("a.APT")) == ("path",)
@@ -186,6 +198,8 @@ def test_a_post_gets_its_options(distribution):
 def test_an_unknown_post_is_answered_with_the_nearest():
     with pytest.raises(JobError, match=r"no postprocessor 'val'; did you mean val3\?"):
         plugins.postprocessor("val")
+    with pytest.raises(JobError, match=r"no postprocessor 'VAL3'; did you mean val3\?"):
+        plugins.postprocessor("VAL3")
     with pytest.raises(JobError, match="no postprocessor 'XYZ'; known: csv, gcode, val3"):
         plugins.postprocessor("XYZ")
 
@@ -219,5 +233,6 @@ def test_the_post_of_the_contributing_guide_writes_a_program(distribution):
     program = Program("edge", path, (Status.APPROACH, Status.COVERED))
     files = plugins.postprocessor("linear", {"decimals": "1"}).write(program)
     assert files == {
-        "edge.lin": b"PROGRAM edge\nFAST 0.0 0.0 50.0 0.0 0.0 1.0\nLIN 0.0 0.0 5.0 0.0 0.0 1.0 600.0\nEND\n"
+        "edge.lin": b"PROGRAM edge\n; edge\n; not a safety function: verify at reduced speed\n"
+        b"FAST 0.0 0.0 50.0 0.0 0.0 1.0\nLIN 0.0 0.0 5.0 0.0 0.0 1.0 600.0\nEND\n"
     }

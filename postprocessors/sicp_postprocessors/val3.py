@@ -27,7 +27,6 @@ from sicp_postprocessors.val3_code import (
 from sicp_postprocessors.val3_findings import (
     axis_findings,
     cell_findings,
-    corner_findings,
     flange_findings,
     spindle_findings,
     stop_findings,
@@ -80,7 +79,6 @@ class Val3(Postprocessor):
             *axis_findings(path, angles_deg),
             *flange_findings(path, angles_deg, self.name),
             *stop_findings(path, options, self.name),
-            *corner_findings(path, options, self.name),
         ]
         if not abs(self._world_program(program)[:3, 3]).max() <= LARGEST:
             words = flag(self.name, "cell", "x,y,z,rx,ry,rz")
@@ -133,8 +131,8 @@ class Val3(Postprocessor):
             "points: mm and degrees, R = Rx Ry Rz, in frame fPart; tool Z points out of the flange into the work",
         ]
         if options.blends:
-            reach = trimmed(options.blend_mm, 6)
-            remarks.append(f"points between cuts are blended, leave and reach {reach} mm at most")
+            reach, off = trimmed(options.blend_mm, 6), trimmed(options.blend_corner_mm, 6)
+            remarks.append(f"points between cuts are blended: within {reach} mm, corners cut by {off} mm at most")
         if options.first_run:
             speed = trimmed(options.first_run_mm_s, 3)
             remarks.append(f"first run: no blending, no move faster than {speed} mm/s")

@@ -2,12 +2,10 @@
 
 Codes: 630 tool not given, 631 cell not given, 632 output not linked, 633 spindle direction, 634 spindle speed not
 commanded, 635 flange turns further than the tool axis, 636 tool change by hand, 637 cutting with the spindle off,
-638 several tools, 639 stops between cutting moves, 640 corners rounded, 641 angles that miss the tool axis.
+638 several tools, 639 stops between cutting moves, 640 angles that miss the tool axis.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -26,7 +24,6 @@ from sicp_postprocessors.val3_poses import flange_turns_deg, rotation_matrices
 __all__ = [
     "axis_findings",
     "cell_findings",
-    "corner_findings",
     "flange_findings",
     "spindle_findings",
     "stop_findings",
@@ -36,7 +33,6 @@ __all__ = [
 _FLANGE_TURN_DEG = 30.0
 _AXIS_ERROR_DEG = 1e-3
 _FEW_STOPS = 10
-_CORNER_MM = 0.05
 _SIX = "x,y,z,rx,ry,rz"
 
 
@@ -102,7 +98,7 @@ def axis_findings(path: ToolPath, angles_deg: FloatArray) -> list[Finding]:
     """Check by the controller's own formula that rx, ry, rz (n, 3) turn the tool's Z against the axis of each move."""
     errors = axis_errors_deg(path.axes, -rotation_matrices(angles_deg)[:, :, 2])
     message = f"rx, ry, rz miss the tool axis by more than {_AXIS_ERROR_DEG:g} degrees; report this"
-    return stretch_findings(path, errors > _AXIS_ERROR_DEG, 641, Level.FAIL, message)
+    return stretch_findings(path, errors > _AXIS_ERROR_DEG, 640, Level.FAIL, message)
 
 
 def flange_findings(path: ToolPath, angles_deg: FloatArray, post: str) -> list[Finding]:
@@ -119,7 +115,7 @@ def stop_findings(path: ToolPath, options: Val3Options, post: str) -> list[Findi
     told = f"the robot stops at {counted(len(stops), 'point')} between cutting moves"
     where = move_place(path, int(stops[0]), int(stops[-1])) if len(stops) else ""
     if options.blends:
-        message = f"{told}, because a neighbour is too close to blend; take double points out of the path"
+        message = f"{told}, where a blend would be below 0.001 mm; take double points out of the path"
         return [Finding(639, Level.INFO, message, where)] if len(stops) else []
     if len(stops) <= _FEW_STOPS:
         return []
@@ -127,30 +123,6 @@ def stop_findings(path: ToolPath, options: Val3Options, post: str) -> list[Findi
         words = flag(post, "first_run", "false")
         return [Finding(639, Level.INFO, f"{told}, as a first run does; production: {words}", where)]
     return [Finding(639, Level.WARN, f"{told}; let it run through with {flag(post, 'blend', 'Cartesian')}", where)]
-
-
-def corner_findings(path: ToolPath, options: Val3Options, post: str) -> list[Finding]:
-    """Tell how far blending may leave the path at its sharpest corner.
-
-    A blend stays within the triangle of the corner and the two points that lie the blend distance d before and behind
-    it; where the path turns by t, the far side of that triangle passes the corner at d sin(t / 2).
-    """
-    if len(path) < 3:
-        return []
-    steps, blends = np.diff(path.tips_mm, axis=0), blends_mm(path, options)[1:-1]
-    directions = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-9)
-    half_turn_sines = np.where(blends > 0.0, np.linalg.norm(np.diff(directions, axis=0), axis=1) / 2.0, 0.0)
-    cuts_mm = blends * half_turn_sines
-    sharpest = int(np.argmax(cuts_mm))
-    if cuts_mm[sharpest] <= _CORNER_MM:
-        return []
-    enough_mm = math.floor(1000.0 * _CORNER_MM / float(half_turn_sines.max())) / 1000.0
-    words = flag(post, "blend_mm", f"{enough_mm:g}")
-    message = (
-        f"blending may cut the sharpest corner by up to {cuts_mm[sharpest]:.2f} mm; "
-        f"{words} keeps every corner within {_CORNER_MM:g} mm"
-    )
-    return [Finding(640, Level.INFO, message, move_place(path, sharpest + 1))]
 
 
 def _changes_without_restart(path: ToolPath) -> list[Event]:

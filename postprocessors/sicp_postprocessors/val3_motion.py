@@ -110,15 +110,20 @@ def passed_points(path: ToolPath) -> BoolArray:
 def blends_mm(path: ToolPath, options: Val3Options) -> FloatArray:
     """Return the blend distance of each move (n,), zero where the tool must come to its point.
 
-    No blend is longer than half of the shorter neighbouring segment. Distances go down by halves from `blend_mm`, so
-    that a path of uneven spacing does not need one mdesc for every point; below a micrometre there is none.
+    No blend is longer than half of the shorter neighbouring segment. It stays within the triangle of the point and the
+    two places that lie the distance d before and behind it; where the path turns by t, the far side of that triangle
+    passes the point at d sin(t / 2), and `blend_corner_mm` holds that down. Distances are `blend_mm` or go down by
+    halves, so that a path of uneven spacing does not need one mdesc for every point; below a micrometre there is none.
     """
     blends = np.zeros(len(path))
-    if not options.blends:
+    if not options.blends or len(path) < 3:
         return blends
-    lengths = np.linalg.norm(np.diff(path.tips_mm, axis=0), axis=1)
-    room = np.minimum(lengths[:-1], lengths[1:]) / 2.0
-    steps = np.ceil(np.log2(options.blend_mm / np.maximum(room, 1e-9)))
-    blends[1:-1] = options.blend_mm / 2.0 ** np.maximum(steps, 0.0)
+    steps_mm = np.diff(path.tips_mm, axis=0)
+    lengths = np.linalg.norm(steps_mm, axis=1)
+    turns = np.diff(steps_mm / np.maximum(lengths, 1e-9)[:, None], axis=0)
+    corner = options.blend_corner_mm / np.maximum(np.linalg.norm(turns, axis=1) / 2.0, 1e-9)
+    longest = np.minimum(np.minimum(lengths[:-1], lengths[1:]) / 2.0, corner)
+    halvings = np.ceil(np.log2(options.blend_mm / np.maximum(longest, 1e-9)))
+    blends[1:-1] = options.blend_mm / 2.0 ** np.maximum(halvings, 0.0)
     blends[~passed_points(path) | (blends < _SMALLEST_BLEND_MM)] = 0.0
     return blends

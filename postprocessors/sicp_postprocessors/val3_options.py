@@ -51,6 +51,8 @@ class Val3Options:
     """Round the points between two cutting moves; or `off`: come to rest at every point."""
     blend_mm: float = 0.5
     """Where blending leaves and reaches the path, at most; never more than half of the shorter neighbouring segment."""
+    blend_corner_mm: float = 0.05
+    """How far a blend may cut a corner, at most: where the path turns sharply, leave and reach are shorter for it."""
     first_run: bool = False
     """Write a program for the first run: no blending, and no move faster than `first_run_mm_s`."""
     first_run_mm_s: float = 50.0
@@ -93,6 +95,7 @@ class Val3Options:
             *outside("rotation_deg_s", self.rotation_deg_s, 0.1, 99_999.0),
             *outside("accel_percent", self.accel_percent, 1.0, 500.0),
             *outside("blend_mm", self.blend_mm, 0.001, 1000.0),
+            *outside("blend_corner_mm", self.blend_corner_mm, 0.001, 1000.0),
             *outside("first_run_mm_s", self.first_run_mm_s, 0.1, 250.0),
             *outside("spindle_dwell_s", self.spindle_dwell_s, 0.0, 600.0),
             *outside("spindle_speed_scale", self.speed_scale, 1e-6, 1e3),

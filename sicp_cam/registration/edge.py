@@ -26,14 +26,14 @@ from sicp_cam.registration.stations import even_stations, interpolated, windows
 __all__ = ["EdgeMeasurement", "gaps", "measure", "on_curve"]
 
 RIM_WIDTH_SPACINGS = 3.0
-EDGE_WIDTH_SPACINGS = 8.0
+EDGE_WIDTH_SPACINGS = 12.0
 """Standard deviation of the edge window along the contour, in point spacings."""
 DECAY_SPACINGS = 0.15
 INTERIOR_SPACINGS = (2, 7)
 """Depths between which the density of the interior is counted, in slices of one spacing."""
 FULL_SLICE = 0.3
 """Least number of points of a slice of the interior, over that of the fullest slice."""
-RIM_ZONE_SPACINGS = (0.05, 0.4)
+RIM_ZONE_SPACINGS = (0.05, 0.45)
 """Depths behind the edge between which the density of the rim is counted."""
 RIM_ROUNDS = 30
 BEFORE_RIM_SPACINGS = 1.5
@@ -238,10 +238,16 @@ def on_curve(values: FloatArray, measured: EdgeMeasurement, curve: FramedCurve, 
     return np.asarray(np.interp(curve.s_mm, measured.s_mm[known], values[known], period=period))
 
 
-def gaps(measured: EdgeMeasurement, curve: FramedCurve) -> FloatArray:
-    """Return the (g, 2) start and end of each run of stations that the scan does not cover, within 0 and the length."""
+def gaps(measured: EdgeMeasurement, curve: FramedCurve, shown: BoolArray | None = None) -> FloatArray:
+    """Return the (g, 2) start and end of each run of stations that the scan does not show, within 0 and the length.
+
+    Parameters
+    ----------
+    shown
+        (k,) what counts as shown; where the scan covers the edge if left out.
+    """
     step = measured.s_mm[1] - measured.s_mm[0]
-    hidden = np.concatenate([[False], ~measured.covered, [False]])
+    hidden = np.concatenate([[False], ~(measured.covered if shown is None else shown), [False]])
     change = np.flatnonzero(np.diff(hidden.astype(np.int64)))
     edges = np.clip((change.reshape(-1, 2) - 0.5) * step, 0.0, curve.length_mm)
     if curve.closed and hidden[1] and hidden[-2]:

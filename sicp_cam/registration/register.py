@@ -14,7 +14,7 @@ from sicp_cam.model import Contour, FloatArray, Scan
 from sicp_cam.registration.edge import EdgeMeasurement, measure, on_curve
 from sicp_cam.registration.result import RegisteredContour, Registration, Residuals, Segment
 from sicp_cam.registration.rigid import NominalContour, RigidPose, facing_rim, register_rigidly
-from sicp_cam.registration.scan_surface import ScanSurface, cropped, prepared
+from sicp_cam.registration.scan_surface import ScanSurface, cropped, prepared, without_copies
 from sicp_cam.registration.segments import blended
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
 from sicp_cam.registration.sicp import Subdivided, paper_s_icp, s_icp
@@ -119,6 +119,7 @@ def _rigid(
 
 
 def _enough(scan: Scan, settings: RegistrationSettings) -> Scan:
+    scan = without_copies(scan)
     if len(scan.points_mm) < MIN_POINTS:
         raise RegistrationError(
             f"only {len(scan.points_mm)} scan points lie within {CROP_MARGIN * settings.reach_mm:g} mm of the contour;"

@@ -12,7 +12,7 @@ from sicp_cam.contour.boundary import Rim, cloud_rim, mesh_rim, surface_normals
 from sicp_cam.contour.frames import FramedCurve
 from sicp_cam.model import FloatArray, IntArray, Scan
 
-__all__ = ["ScanSurface", "cropped", "distances_along_normal", "prepared"]
+__all__ = ["ScanSurface", "cropped", "distances_along_normal", "prepared", "without_copies"]
 
 PLANE_NEIGHBOURS = 12
 
@@ -46,14 +46,16 @@ class ScanSurface:
 
 
 def prepared(scan: Scan) -> ScanSurface:
-    """Return the scan with its k-d tree, spacing and rim; copies of a point in a cloud count once."""
-    scan = scan if scan.faces is not None else _without_copies(scan)
+    """Return a scan without copies of points, see `without_copies`, with its k-d tree, spacing and rim."""
     tree = cKDTree(scan.points_mm)
     rim = cloud_rim(scan.points_mm, tree) if scan.faces is None else mesh_rim(scan.points_mm, scan.faces)
     return ScanSurface(scan.points_mm, tree, rim, _spacing_mm(scan.points_mm, tree), scan.normals, scan.faces)
 
 
-def _without_copies(scan: Scan) -> Scan:
+def without_copies(scan: Scan) -> Scan:
+    """Return a scan with every point once; copies would take the places of a point's neighbours. A mesh stays."""
+    if scan.faces is not None:
+        return scan
     _, first = np.unique(scan.points_mm, axis=0, return_index=True)
     if len(first) == len(scan.points_mm):
         return scan

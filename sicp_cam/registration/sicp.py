@@ -62,8 +62,9 @@ def s_icp(
     sharp = bends(contour.curve, settings.corner_radius_mm)
     found: Subdivided | None = None
     least = np.inf
+    hidden = gaps(measured, contour.curve, measured.edge_trusted)
     for pieces in _ladder(contour.curve, surface.spacing_mm, settings):
-        parts = subdivide(contour.curve, pieces, settings.overlap, sharp, gaps(measured, contour.curve))
+        parts = subdivide(contour.curve, pieces, settings.overlap, sharp, hidden)
         tried = _registered(contour, parts, targets, surface, T_primary, settings)
         misfit = _mean_out(tried.curve, targets)
         if found is None or misfit < least:

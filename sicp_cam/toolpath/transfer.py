@@ -24,6 +24,8 @@ __all__ = ["CorrectedPath", "carried", "correct_path"]
 
 AXIS_STEP = np.radians(0.1)
 """Turn of the axis between two points, away from their mean, above which points are added in between."""
+HEAD_ON = 0.9
+"""Change of the distance from the contour per travel above which a step approaches or retracts."""
 CUTTING_SHARE = 0.6
 """Share of a move along its contour above which it cuts, though it ends elsewhere."""
 
@@ -82,7 +84,8 @@ def correct_path(
     source = steps.source
     cutting = ~path.rapid[source] & (assignment.distance_mm <= on_contour_mm)
     tips, axes = carried(steps.tips_mm, steps.axes, assignment.contour, contours, T_scan_part, settings)
-    bent = any_of(cutting & _off_straight(tips, axes, steps, settings.chord_mm), source, len(path))
+    along = cutting & _along(steps, assignment.distance_mm)
+    bent = any_of(along & _off_straight(tips, axes, steps, settings.chord_mm), source, len(path))
     kept = bent[source] | (steps.fraction == 1.0)
     nominal = _with_steps(path, steps, kept)
     rigid = replace(nominal, tips_mm=apply(T_scan_part, nominal.tips_mm), axes=rotate(T_scan_part, nominal.axes))
@@ -135,6 +138,13 @@ def _smoothstep(t: FloatArray) -> FloatArray:
     t = np.clip(t, 0.0, 1.0)
     risen: FloatArray = t**3 * (t * (6.0 * t - 15.0) + 10.0)
     return risen
+
+
+def _along(steps: Steps, distance_mm: FloatArray) -> BoolArray:
+    """Say which steps run along their contour rather than straight towards or away from it."""
+    length = np.linalg.norm(np.diff(steps.tips_mm, axis=0, prepend=steps.tips_mm[:1]), axis=1)
+    nearing = np.abs(np.diff(distance_mm, prepend=distance_mm[:1]))
+    return np.asarray(nearing < HEAD_ON * length)
 
 
 def _off_straight(tips: FloatArray, axes: FloatArray, steps: Steps, chord_mm: float) -> BoolArray:

@@ -1,16 +1,34 @@
+import dataclasses
 import json
 from pathlib import Path
 
 import pytest
 
+from sicp_cam.cli.inspect_lines import inspect_lines
+from sicp_cam.job import Job
+from sicp_cam.job_tables import GATES, TABLES
 from sicp_cam.limits import Limits
+from sicp_cam.option_help import written
+from sicp_cam.registration.settings import METHODS
 
+HEAD = {
+    "sha256": "ab",
+    "units": "mm",
+    "unit_stated": True,
+    "bounds": {"min_mm": [0.0, 0.0, 0.0], "max_mm": [1, 2.5, 3]},
+}
 DOCUMENT = {
+    **HEAD,
     "role": "scan",
+    "path": "points.csv",
+    "format": "ASCII",
+    "unit_stated": False,
     "count": 3,
-    "bounds_mm": [[0.0, 0.0, 0.0], [1.0, 2.5, 3.0]],
-    "units": None,
-    "findings": [{"code": 101, "message": "odd\x1b"}],
+    "triangles": 0,
+    "normals": False,
+    "spacing_mm": None,
+    "loops": [],
+    "findings": [{"code": 101, "level": "info", "message": "odd\x1b", "where": "line 3"}],
 }
 
 
@@ -27,7 +45,8 @@ def asked(stand_in):
 
 
 def test_inspect_hands_on_what_is_asked(run, files, asked):
-    words = ["--units", "inch", "--picture", "p.png", "--set", "decimal=,", "--set", "scan.columns=x,y,z"]
+    Path("points.csv").write_bytes(b"x")
+    words = ["--units", "inch", "--picture", "p.png", "--force", "--set", "decimal=,", "--set", "scan.columns=x,y,z"]
     code, out, err = run("inspect", "points.csv", "--role", "scan", *words, "--set", "limits.points=9")
     assert (code, err) == (0, "")
     assert asked == [
@@ -38,31 +57,87 @@ def test_inspect_hands_on_what_is_asked(run, files, asked):
                 "units": "inch",
                 "options": {"decimal": ",", "columns": "x,y,z"},
                 "picture": Path("p.png"),
+                "force": True,
                 "limits": Limits(points=9),
             },
         )
     ]
     assert out.splitlines() == [
         "role: scan",
-        "count: 3",
-        "bounds_mm:",
-        "  1: 0, 0, 0",
-        "  2: 1, 2.5, 3",
-        "units: -",
-        "findings:",
-        "  1:",
-        "    code: 101",
-        "    message: odd\\x1b",
+        "path: points.csv",
+        "sha256: ab",
+        "format: ASCII",
+        "unit: not stated: mm assumed (say it with --units)",
+        "bounds: 0, 0, 0 to 1, 2.5, 3 mm",
+        "points: 3",
+        "triangles: none",
+        "normals: none",
+        "spacing: not known, too few points",
+        "loops: none",
+        "findings: 1",
+        "  info 101: line 3: odd\\x1b",
     ]
+
+
+def test_inspect_tells_of_a_part_contour_by_contour():
+    contour = {
+        "number": 1,
+        "kind": "skin",
+        "length_mm": 628.3185,
+        "closed": True,
+        "corners": 1,
+        "centre_mm": [0, 0, 4.0],
+    }
+    wall = {**contour, "number": 2, "kind": "wall", "closed": False, "corners": 0, "looks": "all round"}
+    document = {**HEAD, "role": "part", "path": "a.step", "format": "STEP", "triangles": 12, "findings": []}
+    document["contours"] = [{**contour, "looks": "towards +Z"}, wall]
+    assert list(inspect_lines(document))[4:] == [
+        "unit: mm",
+        "bounds: 0, 0, 0 to 1, 2.5, 3 mm",
+        "triangles: 12",
+        "contours: 2",
+        "  1: skin, 628.3185 mm long, closed, 1 corner, centre 0, 0, 4, looks towards +Z",
+        "  2: wall, 628.3185 mm long, open, no corners, centre 0, 0, 4, looks all round",
+        "findings: none",
+    ]
+
+
+def test_inspect_tells_of_a_path_in_its_own_words():
+    path = {"count": 3, "rapid_moves": 1, "feed_moves": 2, "length_mm": 12.5, "name": "", "events": {"tool": 1}}
+    document = {**HEAD, **path, "role": "path", "path": "a.nc", "format": "G-code", "findings": []}
+    told = list(inspect_lines({**document, "feeds_mm_min": [600.0], "different_feeds": 3}))[6:]
+    assert told == [
+        "name: none",
+        "moves: 3, of which 1 rapid and 2 feed",
+        "length: 12.5 mm",
+        "feeds: 600 mm/min, the lowest of 3",
+        "events: 1 tool",
+        "findings: none",
+    ]
+    told = list(inspect_lines({**document, "feeds_mm_min": [], "different_feeds": 0, "events": {}}))
+    assert {"feeds: none", "events: none"} <= set(told)
 
 
 def test_inspect_finds_the_role_or_asks_for_it(run, files, asked):
     assert run("inspect", "part.step", "--json")[:2] == (0, json.dumps(DOCUMENT, indent=2) + "\n")
     assert asked[0][1]["role"] == "part"
+    for name in ("mesh.stl", "movie.mp4", "job.toml"):
+        Path(name).write_bytes(b"x")
     code, _, err = run("inspect", "mesh.stl")
     assert (code, err) == (2, "sicp-cam: error: mesh.stl: may be a scan or a part; say which with --role\n")
     code, _, err = run("inspect", "movie.mp4")
     assert (code, err) == (3, "sicp-cam: error: movie.mp4: nothing reads this suffix; see sicp-cam plugins\n")
+    assert "if it is a job, give it to sicp-cam correct" in run("inspect", "job.toml")[2]
+    code, _, err = run("inspect", "prt.step")
+    assert (code, err) == (3, "sicp-cam: error: prt.step: no such file (did you mean part.step?)\n")
+
+
+@pytest.mark.parametrize("name", ["pose.txt", "pose.csv", "pose.mat"])
+def test_inspect_knows_a_pose_and_says_where_it_belongs(run, files, asked, name):
+    Path(name).write_text("# T_scan_part\n1,0,0,5\n0,1,0,5\n0,0,1,5\n0,0,0,1\n", encoding="ascii")
+    told = f"sicp-cam: error: {name}: this is a pose, a 4x4 matrix; give it with --align\n"
+    assert run("inspect", name) == (3, "", told)
+    assert not asked
 
 
 @pytest.mark.parametrize(
@@ -90,9 +165,97 @@ def test_plugins_lists_every_reader_and_post(run, files):
 def test_plugins_as_json(run, files):
     code, out, _ = run("plugins", "--json")
     document = json.loads(out)
-    assert code == 0
+    assert (code, document["status"], document["exit_code"]) == (0, "ok", 0)
     assert {"group", "name", "value", "owner", "override"} == set(document["plugins"][0])
     assert document["findings"] == []
+
+
+def test_a_post_is_told_option_by_option(run, files):
+    code, out, err = run("plugins", "gcode")
+    lines = out.splitlines()
+    assert (code, err) == (0, "")
+    assert lines[0].startswith("gcode: postprocessor, sicp_postprocessors.gcode:GCode, from sicp-cam ")
+    assert "[options.post.gcode]" in lines[2]
+    at = lines.index("  --set post.gcode.kinematics=...  AC or BC; default AC")
+    assert lines[at + 1].startswith("      Head with both rotary axes")
+    assert max(map(len, lines)) <= 120
+
+
+def test_a_reader_is_told_option_by_option(run, files):
+    code, out, _ = run("plugins", "path.nc")
+    lines = out.splitlines()
+    assert (code, lines[0].partition(",")[0]) == (0, "path.nc: reader of a path")
+    assert "  --set path.rotary=...  text, or none; default none" in lines
+    assert "  --set path.block_skip=...  true or false; default true" in lines
+    assert "      True to leave out blocks that begin with a slash, False to read them." in lines
+    assert not [line for line in lines if "path.limits" in line or "path.units" in line]
+    assert "--set path.format=... " in run("plugins", "path.apt")[1]
+
+
+def test_a_name_that_several_have_tells_of_all(run, files):
+    document = json.loads(run("plugins", "csv", "--json")[1])
+    assert [(one["role"], one["name"]) for one in document["plugins"]] == [
+        ("post", "csv"),
+        ("scan", "scan.csv"),
+        ("path", "path.csv"),
+    ]
+    assert document["plugins"][0]["options"] is not None
+    flags = {option["name"]: option["flag"] for option in document["plugins"][1]["options"]}
+    assert flags["decimal"] == "--set scan.decimal=..."
+    assert run("plugins", ".ply")[1] == run("plugins", "scan.ply")[1]
+
+
+@pytest.mark.parametrize(
+    ("entry", "source", "told"),
+    [
+        ("[sicp_cam.formats]\nscan.odd = odd:read", "raise RuntimeError('no licence')", "RuntimeError: no licence"),
+        ("[sicp_cam.formats]\nscan.ply = odd:read", "read = len", "scan.ply: claimed by "),
+    ],
+)
+def test_check_fails_where_a_plug_in_is_of_no_use(run, files, tmp_path, monkeypatch, entry, source, told):
+    info = tmp_path / "odd-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 1.0\n", encoding="utf-8")
+    (info / "entry_points.txt").write_text(entry, encoding="utf-8")
+    (tmp_path / "odd.py").write_text(source, encoding="utf-8")
+    assert run("plugins", "--check")[0] == 0
+    monkeypatch.syspath_prepend(str(tmp_path))
+    code, out, err = run("plugins", "--check", "-q")
+    assert (code, err.count("\n")) == (2, 1)
+    assert told in err and err.startswith("sicp-cam: error: ")
+    assert "scan" in out
+    code, out, _ = run("plugins", "--check", "--json")
+    document = json.loads(out)
+    assert (code, document["exit_code"], document["status"]) == (2, 2, "fail")
+    assert told in document["findings"][0]["message"]
+    assert run("plugins")[0] == 0
+
+
+def test_settings_lists_every_setting_with_type_default_and_meaning(run, files):
+    code, out, err = run("settings")
+    lines = out.splitlines()
+    assert (code, err) == (0, "")
+    for name, kind in TABLES.items():
+        assert [line for line in lines if line.startswith(f"job file, [{name}]: ")]
+        for field in dataclasses.fields(kind):
+            (line,) = [line for line in lines if line.startswith(f"  --set {name}.{field.name}=...  ")]
+            assert line.endswith(f"; default {written(field.default)}")
+    at = lines.index("  --set gates.coverage=...  number from 0 to 1; default 0.5")
+    assert lines[at + 1] == "      Least fraction of the contour on which the scan must show the edge."
+    assert "  --dry-run  true or false; default false" in lines
+    assert "  --cad  file name; must be given" in lines
+
+
+def test_settings_of_one_table_as_json(run, files):
+    document = json.loads(run("settings", "registration", "--json")[1])
+    (table,) = document["settings"].values()
+    assert table[0] | {"text": ""} == {
+        "name": "segments",
+        "type": "whole number from 1 to 10000, or none",
+        "default": "none",
+        "text": "",
+        "flag": "--set registration.segments=...",
+    }
 
 
 def test_doctor_names_the_package_of_a_missing_library(run, files, monkeypatch):
@@ -135,6 +298,20 @@ def test_the_help_of_correct_names_every_flag_of_the_contract(run, files):
     out = run("correct", "--help")[1]
     assert [flag for flag in flags.split() if f"--{flag} " not in out and f"--{flag}\n" not in out] == []
     assert "--no-" not in out and "--empty-" not in out
+
+
+def test_the_help_of_correct_shows_every_default_choice_and_where_more_is_listed(run, files):
+    out = " ".join(run("correct", "--help")[1].replace("\u2502", " ").split())
+    flags = dict(part.partition(" ")[::2] for part in out.split(" --")[1:])
+    for field in dataclasses.fields(Job):
+        flag = field.name.replace("_", "-")
+        if field.name in TABLES or field.name.endswith("_options") or field.default is dataclasses.MISSING:
+            continue
+        shown = "as the file states, else mm" if flag.endswith("units") else written(field.default)
+        assert f"[default: {shown}]" in flags[flag], flag
+    assert [gate for gate in GATES if gate not in flags["override"]] == []
+    assert [method for method in METHODS if method not in flags["method"]] == []
+    assert "'sicp-cam settings'" in out and "'sicp-cam plugins val3'" in out
 
 
 def test_version(run, files):

@@ -203,3 +203,24 @@ def test_flags_beat_variables_and_those_the_job_file(run, files, pipeline, tmp_p
     assert (jobs[0].name, jobs[0].method, jobs[0].frame) == ("c", "paper", "part")
     assert jobs[0].cad.resolve() == tmp_path / "part.step"
     assert jobs[0].out.resolve() == tmp_path / "sub" / "out"
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["--scan", "scan.e57"], 3, "scan.e57: no reader for a scan with the suffix '.e57'"),
+        (["--set", "path.chrd_mm=1"], 2, "path.chrd_mm: unknown option; did you mean chord_mm?"),
+        (["--set", "post.csv.decimals=1"], 2, "csv has no option 'decimals'"),
+        (["--cad", "scan.ply", "--scan", "part.step"], 2, "are --cad and --scan swapped?"),
+    ],
+)
+def test_what_the_job_alone_shows_is_told_before_a_file_is_read(run, files, tmp_path, words, code, told):
+    """The files hold nothing that could be read, and the error is none of theirs."""
+    (tmp_path / "scan.e57").write_bytes(b"x")
+    changed = dict(zip(files[::2], files[1::2], strict=True))
+    for flag in words[::2]:
+        changed.pop(flag, None)
+    stated = [word for pair in changed.items() for word in pair]
+    found, out, err = run("correct", *stated, *words)
+    assert (found, out, err.count("\n")) == (code, "", 1)
+    assert told in err

@@ -33,7 +33,7 @@ def test_the_module_is_the_command(files):
     assert run.stdout.strip()[0].isdigit()
 
 
-@pytest.mark.parametrize("words", [["--help"], ["correct", "--help"], ["correct"], ["plugins"]])
+@pytest.mark.parametrize("words", [["--help"], ["correct", "--help"], ["correct"], ["plugins"], ["settings"]])
 def test_nothing_heavy_is_loaded_before_there_is_work(files, words):
     script = (
         "import sys\nfrom sicp_cam.cli import main\n"
@@ -67,6 +67,63 @@ def test_a_signal_unwinds_the_work_and_has_its_code(files, number, code, told):
         out, err = p.communicate(timeout=10)
     assert (p.returncode, out, err) == (code, "", f"sicp-cam: error: {told}\n")
     assert Path("undone").exists()
+
+
+PLUGIN = """
+import time
+from sicp_cam import child_process
+from sicp_cam.model import Part, TriangleMesh
+
+def read_part(path, *, units=None, limits=None):
+    child_process.run("slow_child", {}, timeout_s=60)
+
+def read_small_part(path, *, units=None, limits=None):
+    return Part((), TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+
+def read_scan(path, *, units=None, limits=None):
+    open("working", "w").write("0")
+    time.sleep(60)
+"""
+CHILD = "import os, time\nopen('working', 'w').write(str(os.getpid()))\ntime.sleep(60)"
+
+
+@pytest.mark.parametrize(
+    "readers", ["part.step = slow:read_part", "part.step = slow:read_small_part\nscan.ply = slow:read_scan"]
+)
+def test_an_interrupt_ends_the_reading_of_a_slow_file_at_once(files, tmp_path, readers):
+    """The part is read in a child process, which is ended; the scan in a thread beside it, which is not waited for."""
+    plugin = tmp_path / "plugin"
+    info = plugin / "slow-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: slow\nVersion: 1.0\n", encoding="utf-8")
+    (info / "entry_points.txt").write_text(f"[sicp_cam.formats.override]\n{readers}\n", encoding="utf-8")
+    (plugin / "slow.py").write_text(PLUGIN, encoding="utf-8")
+    (plugin / "slow_child.py").write_text(CHILD, encoding="utf-8")
+    before = sorted(tmp_path.iterdir())
+    line = [sys.executable, "-B", "-m", "sicp_cam", "correct", *files]
+    variables = {**os.environ, "PYTHONPATH": str(plugin)}
+    with subprocess.Popen(line, stderr=subprocess.PIPE, text=True, env=variables) as process:
+        child = int(content_of(Path("working")))
+        start = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        err = process.communicate(timeout=30)[1]
+        seconds = time.monotonic() - start
+    assert (process.returncode, err) == (130, "sicp-cam: error: interrupted\n")
+    assert seconds < 2.0
+    if child:
+        with pytest.raises(ProcessLookupError):
+            os.kill(child, 0)
+    Path("working").unlink()
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def content_of(file):
+    """Wait for a file that another process writes, and return what it holds."""
+    end = time.monotonic() + 30.0
+    while not (file.exists() and file.read_text(encoding="ascii")):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    return file.read_text(encoding="ascii")
 
 
 def test_a_reader_that_goes_away_is_no_error(files):

@@ -316,7 +316,7 @@ class TestBlend:
         moves = self.moves(straight_program(520, spacing=2.0, events=events))
         assert [i for i, m in enumerate(moves) if m["blend"] == "off"] == [0, 199, 519]
         assert {(m["leave"], m["reach"]) for m in moves if m["blend"] == "Cartesian"} == {("0.5", "0.5")}
-        assert [f.code for f in Val3().preflight(straight_program(520, spacing=2.0)) if f.code in (639, 640)] == []
+        assert [f.code for f in Val3().preflight(straight_program(520, spacing=2.0)) if f.code == 639] == []
 
     def test_a_large_blend_is_made_smaller_and_not_left_out(self):
         moves = self.moves(straight_program(20, spacing=0.01), blend_mm=100)
@@ -331,7 +331,7 @@ class TestBlend:
         def blended(**options):
             return [x for x in load_val3(Val3(options).write(straight_program(9))).code["start"] if "blended" in x]
 
-        assert blended(blend_mm=0.25) == ["// points between cuts are blended, leave and reach 0.25 mm at most"]
+        assert blended(blend_mm=0.25) == ["// points between cuts are blended: within 0.25 mm, corners cut by 0.05 mm"]
         assert blended(blend="off") == blended(first_run=True) == []
 
     @pytest.mark.parametrize(
@@ -360,17 +360,18 @@ class TestBlend:
         single = np.delete(tips, 3, axis=0)
         assert 639 not in codes(Val3(), program_of(path_of(single, [[0, 0, 1]] * 5, 600.0, [True] + [False] * 4)))
 
-    @pytest.mark.parametrize("turn_deg", [20.0, 90.0, 150.0])
-    def test_cut_corners_are_told_with_a_blend_that_keeps_them(self, turn_deg):
+    @pytest.mark.parametrize("turn_deg", [20.0, 90.0, 150.0, 180.0])
+    @pytest.mark.parametrize(("options", "most_mm"), [({}, 0.05), ({"blend_corner_mm": 0.2}, 0.2)], ids=str)
+    def test_corners_are_cut_by_no_more_than_allowed(self, turn_deg, options, most_mm):
         turn = np.radians(turn_deg)
-        tips = np.array([[-20, 0, 0], [-10, 0, 0], [0, 0, 0], [10 * np.cos(turn), 10 * np.sin(turn), 0]])
-        program = program_of(path_of(tips, [[0, 0, 1]] * 4, 600.0, [True] + [False] * 3))
-        (told,) = [f for f in Val3().preflight(program) if f.code == 640]
-        assert (told.level, told.where) == (Level.INFO, "move 2, line 12")
-        assert f"up to {0.5 * np.sin(turn / 2):.2f} mm" in told.message
-        enough = re.search(r"--set post\.val3\.blend_mm=([0-9.]+) ", told.message)[1]
-        assert 0.04 < float(enough) * np.sin(turn / 2) <= 0.05
-        assert 640 not in codes(Val3({"blend_mm": enough}), program)
+        after = np.array([np.cos(turn), np.sin(turn), 0.0])
+        tips = np.array([[-20, 0, 0], [-10, 0, 0], [0, 0, 0], 10 * after, 20 * after])
+        moves = self.moves(program_of(path_of(tips, [[0, 0, 1]] * 5, 600.0, [True] + [False] * 4)), **options)
+        reach = float(moves[2]["reach"])
+        cut = np.linalg.norm(reach * (after - [1.0, 0.0, 0.0]) / 2.0)
+        assert moves[2]["blend"] == "Cartesian" and cut <= most_mm + 1e-9
+        assert cut > most_mm / 2 or reach == 0.5
+        assert moves[1]["reach"] == moves[3]["reach"] == "0.5"
 
 
 class TestSpindleAndTools:

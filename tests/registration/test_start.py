@@ -66,7 +66,7 @@ def test_an_asymmetric_contour_is_found_from_any_pose(synthetic, dome, seed, hol
     found = find_start([contour], surface, reach_mm=REACH)
     offset = apply(found.T_scan_part, contour.curve.points_mm) - apply(pose, contour.curve.points_mm)
     assert np.linalg.norm(offset, axis=1).max() < 2.0
-    assert found.misfit_mm < 1.0
+    assert found.misfit_mm < 1.5  # the rim is made of points 2 mm apart: their nearest distance has a floor
     assert found.symmetry > 1.5
 
 

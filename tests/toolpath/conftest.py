@@ -7,6 +7,7 @@ import pytest
 
 from sicp_cam.contour.choice import Assignment
 from sicp_cam.contour.frames import FramedCurve, moved, orthonormal
+from sicp_cam.contour.projection import nearest
 from sicp_cam.model import ToolPath
 from sicp_cam.registration.result import RegisteredContour, Residuals
 from sicp_cam.toolpath.settings import ToolPathSettings
@@ -73,13 +74,18 @@ def path(tips, axes=(0.0, 0.0, 1.0), *, rapid=(), feeds=1500.0, events=(), **mor
 
 
 def corrected(tool_path, contours, T=None, *, follows=None, distance_mm=None, on_contour_mm=20.0, **settings):
-    """Correct a path; each move follows the first contour and lies on it, if nothing else is said."""
+    """Correct a path; each move follows the first contour, at its true distance, if nothing else is said."""
     n = len(tool_path)
     which = np.zeros(n, dtype=np.int64) if follows is None else np.asarray(follows, dtype=np.int64)
-    distance = np.zeros(n) if distance_mm is None else np.asarray(distance_mm, dtype=float)
     settings = ToolPathSettings(**settings)
     steps = divided(tool_path, feed_steps(tool_path, settings.step_mm))
-    assignment = Assignment(which[steps.source], distance[steps.source], tuple(range(len(contours))))
+    follows = which[steps.source]
+    if distance_mm is None:
+        distances = np.stack([nearest(steps.tips_mm, contour.nominal)[1] for contour in contours])
+        distance = distances[follows, np.arange(len(follows))]
+    else:
+        distance = np.asarray(distance_mm, dtype=float)[steps.source]
+    assignment = Assignment(follows, distance, tuple(range(len(contours))))
     T = np.eye(4) if T is None else T
     return correct_path(tool_path, steps, assignment, contours, T, settings, on_contour_mm)
 

@@ -147,13 +147,13 @@ def test_events_stay_before_the_move_that_they_preceded(made, bent):
 def test_neither_rapid_nor_approach_moves_are_divided(made, bent):
     tips = [[20.0, 0.0, 60.0], [20.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 0.0, 60.0], [20.0, 0.0, 60.0]]
     source = made.path(tips, rapid=[0, 4])
-    done = made.corrected(source, [bent], distance_mm=[60.0, 0.0, 0.0, 60.0, 60.0])
+    done = made.corrected(source, [bent])
     assert np.bincount(done.corrected.lines - 10).tolist() == [1, 1, 40, 1, 1]
 
 
 def test_a_cut_that_begins_where_the_tool_came_down_is_divided_but_the_way_down_is_not(made, bent):
     tips = [[20.0, 0.0, 60.0], [20.0, 0.0, 0.0], [100.0, 0.0, 0.0]]
-    done = made.corrected(made.path(tips), [bent], distance_mm=[60.0, 0.0, 0.0])
+    done = made.corrected(made.path(tips), [bent])
     assert np.bincount(done.corrected.lines - 10).tolist() == [1, 1, 40]
 
 
