@@ -11,7 +11,7 @@ import numpy as np
 
 from sicp_cam.alignment import read_alignment
 from sicp_cam.contour.choice import Assignment, assign
-from sicp_cam.contour.frames import framed
+from sicp_cam.contour.frames import at, framed
 from sicp_cam.contour.mesh_contours import mesh_contours
 from sicp_cam.contour.projection import nearest
 from sicp_cam.errors import InputError, JobError, PathError, UnitError
@@ -31,6 +31,8 @@ __all__ = ["PartRegistration", "check_scan_unit", "choice_findings", "choose_con
 STEP_MM = 2.0
 CLEARLY_WORSE = 0.3
 """Logarithm of a size ratio by which a unit must fit worse than the best one not to be named."""
+INTO_THE_PART = -0.2
+"""Cosine of tool axis and outward normal below which a tool would come through the skin."""
 OTHER_SKIN_MM = 1.0
 """How much nearer another contour must be to be worth a warning."""
 
@@ -158,12 +160,13 @@ def _refuse_unfollowed(
 
 
 def choice_findings(contours: Sequence[Contour], chosen: Mapping[int, Contour], path: ToolPath) -> tuple[Finding, ...]:
-    """Return a warning where the path lies nearer to another contour than to the chosen one.
+    """Refuse tool axes that point into the part; warn where the path lies nearer to another contour than the chosen.
 
     On a thin part that is the other skin: the tool axis chose this one, or the operator did. The geometry cannot tell
     a tool that reaches through the part from an axis that points the wrong way.
     """
     steps, feed = _feed(path)
+    _refuse_axes_into_the_part(chosen, steps, feed)
     distances = {n: nearest(steps.tips_mm[feed], framed(c))[1] for n, c in enumerate(contours, 1)}
     own = np.min([distances[number] for number in chosen], axis=0)
     median = {number: float(np.median(distance)) for number, distance in distances.items()}
@@ -176,6 +179,19 @@ def choice_findings(contours: Sequence[Contour], chosen: Mapping[int, Contour], 
         f" {closest}: the scan must show the side of contour {number}, and the tool axis must leave the part there"
     )
     return (Finding(405, Level.WARN, text, f"contour {number}"),)
+
+
+def _refuse_axes_into_the_part(chosen: Mapping[int, Contour], steps: Steps, feed: BoolArray) -> None:
+    for number, contour in chosen.items():
+        curve = framed(contour)
+        s_mm, distance = nearest(steps.tips_mm, curve)
+        near = feed & (distance <= np.median(distance[feed]))
+        agreement = np.sum(at(curve, s_mm[near]).outward * steps.axes[near], axis=1)
+        if float(np.median(agreement)) < INTO_THE_PART:
+            raise PathError(
+                f"the tool axes point into the part along contour {number}: they must run from the tip to the holder;"
+                " turn them in the path, or the outward side of the part (the winding of a mesh)"
+            )
 
 
 def check_scan_unit(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> None:

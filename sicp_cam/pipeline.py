@@ -23,7 +23,7 @@ from sicp_cam.job import Job
 from sicp_cam.model import FloatArray, Scan, ToolPath
 from sicp_cam.output_names import joined
 from sicp_cam.registration.register import register_contours
-from sicp_cam.result import Correction, Inputs, input_paths, report_files
+from sicp_cam.result import Correction, Inputs, input_paths, report_files, told
 from sicp_cam.result_document import output_entry
 from sicp_cam.summary import summary
 from sicp_cam.toolpath.gates import GATE_NAMES, Gate, overridden, path_gates, registration_gates
@@ -113,7 +113,7 @@ def _corrected_and_written(job: Job, progress: Progress) -> Outcome:
         output.write(job.out, files, force=job.force, inputs=input_paths(job))
     for finding in correction.findings:
         if finding.level is not Level.INFO:
-            _log.warning("%s", _told(finding))
+            _log.log(logging.ERROR if finding in failed else logging.WARNING, "%s", told(finding))
     progress("done", 1.0)
     return Outcome(document, 8 if failed else 0, tuple(summary(correction, list(programs), list(reports))))
 
@@ -211,11 +211,7 @@ def _judge_warnings(correction: Correction) -> None:
         return
     warnings = [finding for finding in correction.findings if finding.level is Level.WARN]
     if warnings:
-        raise WarningsError(f"no program, because of --strict: {'; '.join(_told(finding) for finding in warnings)}")
-
-
-def _told(finding: Finding) -> str:
-    return f"{finding.where}: {finding.message}" if finding.where else finding.message
+        raise WarningsError(f"no program, because of --strict: {'; '.join(told(finding) for finding in warnings)}")
 
 
 def _names_known_before(job: Job) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,7 +30,9 @@ from sicp_cam.rigid_motion import apply, inverse, rotate
 from sicp_cam.toolpath.gates import Gate
 from sicp_cam.toolpath.transfer import CorrectedPath
 
-__all__ = ["Correction", "Inputs", "input_paths", "report_files"]
+__all__ = ["Correction", "Inputs", "input_paths", "report_files", "told"]
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +72,14 @@ class Correction:
     findings: tuple[Finding, ...]
     timing_s: Mapping[str, float] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Say in one line how it went; the arrays are in the fields."""
+        coverage = min(float(contour.covered.mean()) for contour in self.registration.result.contours)
+        return (
+            f"<Correction {status(self.findings, self.gates)}: {len(self.corrected.nominal)} moves, method"
+            f" {self.job.method}, {100.0 * coverage:.1f} % of the edge seen>"
+        )
+
     @property
     def program(self) -> Program:
         """The corrected path as a program in the frame that the job asks for."""
@@ -90,12 +101,27 @@ class Correction:
     def write(self, post: str, out: str | Path, *, force: bool = False, **options: object) -> list[Path]:
         """Write the program for one controller into a folder and return the files.
 
+        Parameters
+        ----------
+        post
+            Name of the postprocessor.
+        out
+            The folder; made if it does not exist.
+        force
+            True to replace an earlier program.
+        **options
+            What the post takes, such as `tool=(0, 0, 180, 0, 0, 0)`; those of the job are taken where none is given
+            (`sicp-cam plugins NAME` lists them). What the post noticed goes to the log.
+
         Raises
         ------
         JobError, PathError, OutputError
             If the post is unknown, refuses the program, or the files may not be written.
         """
-        written, _ = self.files(post, options)
+        written, noticed = self.files(post, {**self.job.post_options.get(post, {}), **options})
+        for finding in noticed:
+            if finding.level is not Level.INFO:
+                _log.warning("%s", told(finding))
         return output.write(Path(out), written, force=force, inputs=input_paths(self.job))
 
     def document(self, outputs: list[dict[str, Any]] | None = None) -> dict[str, Any]:
@@ -173,6 +199,12 @@ def report_files(
     if "pdf" in kinds:
         try:
             files["report.pdf"] = pdf.build(compose.document(document, pictures, job=correction.job.name))
-        except ReportError as error:
-            failed += (Finding(702, Level.WARN, str(error), "report.pdf"),)
+        except Exception as error:  # whatever a page stumbles over, it must not cost the program
+            text = str(error) if isinstance(error, ReportError) else f"{type(error).__name__}: {error}"
+            failed += (Finding(702, Level.WARN, text, "report.pdf"),)
     return files, failed
+
+
+def told(finding: Finding) -> str:
+    """Return a finding as one line."""
+    return f"{finding.where}: {finding.message}" if finding.where else finding.message

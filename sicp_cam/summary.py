@@ -20,11 +20,13 @@ def summary(correction: Correction, programs: list[str], reports: list[str]) -> 
         f"{verdict}: {len(correction.corrected.nominal)} moves corrected with {job.method};"
         f" the scan shows {100.0 * coverage:.1f} % of the edge"
     )
+    i, j, k = correction.corrected.corrected.axes.mean(axis=0)
+    yield f"the tool comes from ({i:.2f}, {j:.2f}, {k:.2f}) in the scan frame; check that this is the outer side"
     for name, words in (("out", "out of the surface"), ("normal", "across the edge")):
         rigid, after = entry["rigid"][name], entry["corrected"][name]
         if rigid and after:
             yield (
-                f"distance to the scan {words} (RMS): {rigid['rms']:.3f} mm with the rigid pose,"
+                f"fit to the scan {words} (RMS): {rigid['rms']:.3f} mm with the rigid pose,"
                 f" {after['rms']:.3f} mm corrected"
             )
     if job.dry_run:

@@ -19,7 +19,7 @@ from sicp_cam.registration.stations import interpolated, windows
 
 __all__ = ["LocalSurface", "fit_surface"]
 
-DEPTH_SPACINGS = 12.0
+DEPTH_SPACINGS = 10.0
 """Depth of the band of scan points that the surface is fitted to, in point spacings."""
 WIDTH_SPACINGS = 4.0
 """Standard deviation of the window along the contour, in point spacings."""

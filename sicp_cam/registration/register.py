@@ -226,4 +226,4 @@ def _side_findings(side: float | None, has_normals: bool) -> tuple[Finding, ...]
         "the scan fits the part turned over about as well: the start pose alone says which side is outward;"
         " check it, or scan with normals"
     )
-    return (Finding(404, Level.WARN, text),)
+    return (Finding(404, Level.INFO, text),)

@@ -84,7 +84,6 @@ def test_moves_that_do_not_cut_choose_no_contour_but_get_one(synthetic):
     assert len(axes) == cutting.sum()
 
 
-@pytest.mark.xfail(strict=True, reason="a hole with less than 2 % of the cutting moves is given to another contour")
 def test_a_small_hole_beside_a_long_edge_is_not_dropped(synthetic):
     contours = [
         skin(synthetic, synthetic.circle(500.0, hole=False)),
@@ -93,7 +92,7 @@ def test_a_small_hole_beside_a_long_edge_is_not_dropped(synthetic):
     (edge, axes_1), (hole, axes_2) = path_along(contours[0]), path_along(contours[1])
     hole, axes_2 = hole[::2], axes_2[::2]
     chosen = assign(
-        np.vstack([edge, hole]), np.vstack([axes_1, axes_2]), np.ones(len(edge) + len(hole), bool), contours
+        np.vstack([edge, hole]), np.vstack([axes_1, axes_2]), np.ones(len(edge) + len(hole), bool), contours, 20.0
     )
     assert (chosen.contour[len(edge) :] == 1).all()
 

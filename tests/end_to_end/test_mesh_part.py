@@ -94,7 +94,6 @@ def test_a_closed_mesh_is_refused(job, refused, tmp_path, bench):
     assert "box.stl" in line and "no open edge" in line
 
 
-@pytest.mark.xfail(strict=True, reason="no gate and no finding looks at the tool axis against the outward side")
 def test_tool_axes_that_point_into_the_part_are_refused_or_told(job, cli, tmp_path):
     """CL data with the axis the other way round: the holder would come through the skin."""
     folder, _ = job

@@ -87,7 +87,7 @@ def test_keywords_are_the_keys_of_a_job(bench, corrections):
         ({"registration__segmets": 3}, "did you mean segments?"),
         ({"scan": "nowhere.ply"}, "nowhere.ply: no such file"),
         ({"gates__coverage": float("nan")}, "finite"),
-        ({"override": "everything"}, "no gate is called 'everything'"),
+        ({"override": "everything"}, "no gate 'everything'"),
     ],
 )
 def test_a_wrong_keyword_is_a_job_error(bench, settings, told):
