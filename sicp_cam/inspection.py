@@ -14,7 +14,7 @@ from sicp_cam import output, plugins
 from sicp_cam.contour.loops import mesh_loops, resampled, rim_loops
 from sicp_cam.correction import contours_of
 from sicp_cam.errors import InputError, printable
-from sicp_cam.input_files import is_pose
+from sicp_cam.job.input_files import is_pose
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import Contour, FloatArray, Source, ToolPath
 from sicp_cam.registration.scan_surface import ScanSurface, prepared

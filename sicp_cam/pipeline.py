@@ -21,7 +21,7 @@ from sicp_cam.errors import InputError, JobError, PathError, RegistrationError, 
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
 from sicp_cam.model import FloatArray, Scan, ToolPath
-from sicp_cam.output_names import joined
+from sicp_cam.output.names import joined
 from sicp_cam.registration.register import register_contours
 from sicp_cam.result import Correction, Inputs, input_paths, report_files, told
 from sicp_cam.result_document import output_entry

@@ -44,7 +44,7 @@ def correct(
         As the command does, see `sicp_cam.errors`.
     """
     from sicp_cam.job import build
-    from sicp_cam.job_layers import Layer
+    from sicp_cam.job.layers import Layer
     from sicp_cam.pipeline import run
 
     files = {"cad": os.fspath(cad), "scan": os.fspath(scan), "path": os.fspath(path), "out": os.curdir}

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from sicp_cam.beside import beside
-from sicp_cam.input_files import absent, is_pose, no_job, wrong_places
+from sicp_cam.job.input_files import absent, is_pose, no_job, wrong_places
 
 POSE = "1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n"
 

@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sicp_cam import job_layers, plugins
+from sicp_cam import plugins
 from sicp_cam.errors import JobError
 from sicp_cam.job import Job, build
-from sicp_cam.job_layers import Layer, environment, load
-from sicp_cam.job_tables import GATES, RANGES, TABLES
+from sicp_cam.job import layers as job_layers
+from sicp_cam.job.layers import Layer, environment, load
+from sicp_cam.job.tables import GATES, RANGES, TABLES
 from sicp_cam.limits import Limits
-from sicp_cam.option_values import Word, converted, table
+from sicp_cam.options.values import Word, converted, table
 from sicp_cam.registration.settings import RegistrationSettings
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
 

@@ -6,10 +6,10 @@ from typing import Literal
 
 import pytest
 
-from sicp_cam import plugin_options
 from sicp_cam.errors import JobError
-from sicp_cam.option_help import Option, dataclass_options, function_options, parameter_texts, written
-from sicp_cam.plugin_registry import FORMATS, POSTPROCESSORS, Plugin
+from sicp_cam.options.help import Option, dataclass_options, function_options, parameter_texts, written
+from sicp_cam.plugins import options as plugin_options
+from sicp_cam.plugins.registry import FORMATS, POSTPROCESSORS, Plugin
 
 
 class Colour(enum.Enum):

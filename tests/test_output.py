@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sicp_cam.errors import OutputError
 from sicp_cam.output import check_free, supersede, write
-from sicp_cam.output_names import joined, name_problem
+from sicp_cam.output.names import joined, name_problem
 
 NEW = {
     "edge.csv": b"new csv",

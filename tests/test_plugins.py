@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sicp_cam import plugin_registry, plugins
+from sicp_cam import plugins
 from sicp_cam.errors import InputError, JobError
-from sicp_cam.job_layers import settings
+from sicp_cam.job.layers import settings
 from sicp_cam.limits import Limits
 from sicp_cam.model import Scan
+from sicp_cam.plugins import registry as plugin_registry
 
 READER = """
 import numpy as np

@@ -12,8 +12,8 @@ from sicp_cam.cli.progress import progress_shown
 from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
 from sicp_cam.errors import JobError, printable
 from sicp_cam.job import Job
-from sicp_cam.job_tables import GATES
-from sicp_cam.option_help import written
+from sicp_cam.job.tables import GATES
+from sicp_cam.options.help import written
 
 __all__ = ["correct"]
 
@@ -135,7 +135,7 @@ def correct(
 
 def _run(job_file: Path | None, flags: dict[str, object], pairs: list[str], as_json: bool, quiet: bool) -> int:
     from sicp_cam.job import build
-    from sicp_cam.job_layers import environment, load, settings
+    from sicp_cam.job.layers import environment, load, settings
 
     stated = settings(flags, pairs)
     job = build(*([load(job_file)] if job_file else []), environment(), stated)
@@ -156,7 +156,7 @@ def _only(job: Path | None, more: tuple[str, ...]) -> Path | None:
     """Refuse a second word without a flag, and say which flags were meant."""
     if not more:
         return job
-    from sicp_cam.input_files import FLAGS
+    from sicp_cam.job.input_files import FLAGS
     from sicp_cam.plugins import roles
 
     words = [str(job), *more]

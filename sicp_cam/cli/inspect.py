@@ -60,9 +60,9 @@ def _run(
     file: Path, role: Role | None, units: str | None, picture: Path | None, force: bool, pairs: list[str], as_json: bool
 ) -> int:
     from sicp_cam.cli.inspect_lines import inspect_lines
-    from sicp_cam.job_layers import settings
+    from sicp_cam.job.layers import settings
     from sicp_cam.limits import Limits
-    from sicp_cam.option_values import table
+    from sicp_cam.options.values import table
     from sicp_cam.units import mm_per_unit
 
     if units is not None:
@@ -94,7 +94,7 @@ def _run(
 
 
 def _role(file: Path) -> str:
-    from sicp_cam.input_files import absent, is_pose
+    from sicp_cam.job.input_files import absent, is_pose
     from sicp_cam.plugins import roles
 
     name = printable(str(file))

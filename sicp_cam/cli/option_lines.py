@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterable, Iterator
 
 from sicp_cam.errors import printable
-from sicp_cam.option_help import Option
+from sicp_cam.options.help import Option
 
 __all__ = ["option_entries", "option_lines"]
 

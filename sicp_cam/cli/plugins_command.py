@@ -13,8 +13,8 @@ from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
 
 if TYPE_CHECKING:
     from sicp_cam.findings import Finding
-    from sicp_cam.plugin_options import PluginOptions
-    from sicp_cam.plugin_registry import Plugin
+    from sicp_cam.plugins.options import PluginOptions
+    from sicp_cam.plugins.registry import Plugin
 
 __all__ = ["plugins"]
 
@@ -50,7 +50,7 @@ def plugins(
 
 def _listed(check: bool, as_json: bool) -> int:
     from sicp_cam.findings import Level
-    from sicp_cam.plugin_registry import broken, listing
+    from sicp_cam.plugins.registry import broken, listing
 
     found, findings = listing()
     if check:
@@ -74,7 +74,7 @@ def _listed(check: bool, as_json: bool) -> int:
 
 
 def _table(found: Iterable[Plugin]) -> Iterator[str]:
-    from sicp_cam.plugin_registry import POSTPROCESSORS
+    from sicp_cam.plugins.registry import POSTPROCESSORS
 
     rows = [
         (
@@ -99,7 +99,7 @@ def _log(findings: Iterable[Finding], level: int) -> None:
 
 def _told(name: str, as_json: bool) -> int:
     from sicp_cam.cli.option_lines import option_entries
-    from sicp_cam.plugin_options import plugin_options, with_name
+    from sicp_cam.plugins.options import plugin_options, with_name
 
     described = [plugin_options(plugin) for plugin in with_name(name)]
     if as_json:

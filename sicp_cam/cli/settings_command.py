@@ -10,7 +10,7 @@ from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
 from sicp_cam.errors import JobError, printable
 
 if TYPE_CHECKING:
-    from sicp_cam.option_help import Option
+    from sicp_cam.options.help import Option
 
 __all__ = ["settings"]
 
@@ -41,7 +41,7 @@ def settings(
 
 def _run(table: str | None, as_json: bool) -> int:
     from sicp_cam.cli.option_lines import option_entries, option_lines
-    from sicp_cam.option_values import nearest
+    from sicp_cam.options.values import nearest
 
     tables = _tables()
     if table is not None and table not in tables:
@@ -63,8 +63,8 @@ def _run(table: str | None, as_json: bool) -> int:
 def _tables() -> dict[str, tuple[str, tuple[Option, ...]]]:
     """Return a line of text and the options of each table, and of the job itself under `job`."""
     from sicp_cam.job import Job
-    from sicp_cam.job_tables import RANGES, TABLES
-    from sicp_cam.option_help import dataclass_options, summary
+    from sicp_cam.job.tables import RANGES, TABLES
+    from sicp_cam.options.help import dataclass_options, summary
 
     own = [o for o in dataclass_options(Job) if o.name not in TABLES and not o.name.endswith("_options")]
     tables = {name: (summary(kind), dataclass_options(kind, RANGES[name])) for name, kind in TABLES.items()}

@@ -6,9 +6,9 @@ import pytest
 
 from sicp_cam.cli.inspect_lines import inspect_lines
 from sicp_cam.job import Job
-from sicp_cam.job_tables import GATES, TABLES
+from sicp_cam.job.tables import GATES, TABLES
 from sicp_cam.limits import Limits
-from sicp_cam.option_help import written
+from sicp_cam.options.help import written
 from sicp_cam.registration.settings import METHODS
 
 HEAD = {

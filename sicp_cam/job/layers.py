@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from sicp_cam.errors import JobError, printable
-from sicp_cam.input_files import absent, no_job
-from sicp_cam.option_values import Word
+from sicp_cam.job.input_files import absent, no_job
+from sicp_cam.options.values import Word
 
 __all__ = ["OPTION_TABLES", "Layer", "environment", "load", "settings"]
 

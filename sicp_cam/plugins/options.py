@@ -8,9 +8,9 @@ from dataclasses import dataclass, is_dataclass
 from typing import Any
 
 from sicp_cam.errors import JobError, printable
-from sicp_cam.option_help import Option, dataclass_options, function_options, summary
-from sicp_cam.option_values import nearest
-from sicp_cam.plugin_registry import FORMATS, POSTPROCESSORS, ROLES, Plugin, owner, owners
+from sicp_cam.options.help import Option, dataclass_options, function_options, summary
+from sicp_cam.options.values import nearest
+from sicp_cam.plugins.registry import FORMATS, POSTPROCESSORS, ROLES, Plugin, owner, owners
 
 __all__ = ["PluginOptions", "keyword_names", "plugin_options", "takes_any", "with_name"]
 

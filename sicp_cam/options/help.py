@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Literal, Union
 
 from sicp_cam.errors import JobError
-from sicp_cam.option_values import Range
+from sicp_cam.options.values import Range
 
 __all__ = ["Option", "annotations_of", "dataclass_options", "function_options", "parameter_texts", "summary", "written"]
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sicp_cam.errors import printable
-from sicp_cam.option_values import closest
+from sicp_cam.options.values import closest
 from sicp_cam.plugins import roles
 
 __all__ = ["FLAGS", "absent", "is_pose", "no_job", "wrong_places"]

@@ -1,6 +1,6 @@
 """Read files and make postprocessors through whichever plug-in serves them; it is imported only then.
 
-How a plug-in registers stands in `sicp_cam.plugin_registry`; our own formats and posts do it the same way.
+How a plug-in registers stands in `sicp_cam.plugins.registry`; our own formats and posts do it the same way.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from sicp_cam.errors import InputError, JobError, printable
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
-from sicp_cam.option_help import annotations_of
-from sicp_cam.option_values import converted, nearest
-from sicp_cam.plugin_options import keyword_names, takes_any
-from sicp_cam.plugin_registry import FORMATS, POSTPROCESSORS, ROLES, owner, owners
+from sicp_cam.options.help import annotations_of
+from sicp_cam.options.values import converted, nearest
+from sicp_cam.plugins.options import keyword_names, takes_any
+from sicp_cam.plugins.registry import FORMATS, POSTPROCESSORS, ROLES, owner, owners
 
 if TYPE_CHECKING:
     from sicp_cam.model import Part, Scan, ToolPath

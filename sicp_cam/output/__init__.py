@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
 from sicp_cam.errors import OutputError, printable
-from sicp_cam.output_names import check_names
+from sicp_cam.output.names import check_names
 
 __all__ = ["MANIFEST", "SUPERSEDED", "check_free", "supersede", "write"]
 

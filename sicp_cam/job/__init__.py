@@ -29,14 +29,14 @@ from types import MappingProxyType
 from typing import Any, Literal, get_type_hints
 
 from sicp_cam.errors import JobError, printable
-from sicp_cam.input_files import absent, wrong_places
-from sicp_cam.job_keys import misplaced
-from sicp_cam.job_layers import Layer
-from sicp_cam.job_tables import GATES, RANGES, TABLES
+from sicp_cam.job.input_files import absent, wrong_places
+from sicp_cam.job.keys import misplaced
+from sicp_cam.job.layers import Layer
+from sicp_cam.job.tables import GATES, RANGES, TABLES
 from sicp_cam.limits import Limits
-from sicp_cam.option_values import Word, closest, converted, nearest, table
-from sicp_cam.output_names import name_problem
-from sicp_cam.plugin_registry import POSTPROCESSORS, owners
+from sicp_cam.options.values import Word, closest, converted, nearest, table
+from sicp_cam.output.names import name_problem
+from sicp_cam.plugins.registry import POSTPROCESSORS, owners
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
 

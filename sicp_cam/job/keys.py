@@ -6,10 +6,10 @@ from collections.abc import Collection
 from dataclasses import fields
 
 from sicp_cam.errors import printable
-from sicp_cam.job_layers import OPTION_TABLES
-from sicp_cam.job_tables import TABLES, table_key
-from sicp_cam.option_values import closest, nearest
-from sicp_cam.plugin_registry import POSTPROCESSORS, owners
+from sicp_cam.job.layers import OPTION_TABLES
+from sicp_cam.job.tables import TABLES, table_key
+from sicp_cam.options.values import closest, nearest
+from sicp_cam.plugins.registry import POSTPROCESSORS, owners
 
 __all__ = ["misplaced"]
 

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from sicp_cam.limits import Limits
-from sicp_cam.option_values import Range
+from sicp_cam.options.values import Range
 from sicp_cam.registration.settings import RegistrationSettings
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
 

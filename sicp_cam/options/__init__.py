@@ -1,0 +1,1 @@
+"""Options from words: converted to their types, and described for the operator."""
