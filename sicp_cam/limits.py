@@ -9,7 +9,29 @@ __all__ = ["DEFAULT_LIMITS", "Limits"]
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Caps that readers check before they allocate; raise one in the job file where a real input needs it."""
+    """Caps that readers check before they allocate; raise one in the job file where a real input needs it.
+
+    Parameters
+    ----------
+    file_bytes
+        Largest input file.
+    points, faces
+        Most points and triangles of a scan or mesh.
+    header_bytes, header_lines
+        Longest header of a file.
+    line_bytes
+        Longest line of a text file.
+    list_length
+        Most corners of a polygon.
+    path_points
+        Most moves of a tool path.
+    coordinate_mm
+        Largest coordinate, either sign.
+    cad_seconds
+        Longest time that the CAD kernel may take.
+    child_memory_bytes
+        Most memory that the CAD kernel may take, where the system can limit it.
+    """
 
     file_bytes: int = 4 * 2**30
     points: int = 200_000_000
