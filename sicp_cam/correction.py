@@ -1,4 +1,4 @@
-"""The correction in memory: choose the contours, register them, carry the path. No files here."""
+"""The correction in memory: choose the contours, register them, carry the path."""
 
 from __future__ import annotations
 

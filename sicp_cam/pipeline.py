@@ -17,7 +17,7 @@ from sicp_cam import output, plugins
 from sicp_cam.alignment import read_alignment
 from sicp_cam.beside import beside
 from sicp_cam.correction import PartRegistration, check_scan_unit, choice_findings, choose_contours, contours_of
-from sicp_cam.errors import InputError, JobError, PathError, RegistrationError, WarningsError, printable
+from sicp_cam.errors import InputError, PathError, RegistrationError, WarningsError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
 from sicp_cam.model import FloatArray, Scan, ToolPath
@@ -26,7 +26,7 @@ from sicp_cam.registration.register import register_contours
 from sicp_cam.result import Correction, Inputs, input_paths, report_files, told
 from sicp_cam.result_document import output_entry
 from sicp_cam.summary import summary
-from sicp_cam.toolpath.gates import GATE_NAMES, Gate, overridden, path_gates, registration_gates
+from sicp_cam.toolpath.gates import Gate, overridden, path_gates, registration_gates
 
 __all__ = ["Correction", "Outcome", "Progress", "correct", "run"]
 
@@ -126,9 +126,6 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
     JobError, InputError, RegistrationError, PathError
         See the exit codes of each.
     """
-    unknown = [name for name in job.override if name not in GATE_NAMES]
-    if unknown:
-        raise JobError(f"override: no gate is called '{printable(unknown[0])}'; gates are {', '.join(GATE_NAMES)}")
     for post in job.post:
         plugins.postprocessor(post, job.post_options.get(post, {}))  # a wrong option shows before the long work
     plugins.check_reader("part", job.cad, job.part_options)
@@ -141,6 +138,7 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
     with clock.step("contour", 0.2):
         wanted = None if job.contour == "auto" else job.contour
         chosen = choose_contours(contours_of(inputs.part), inputs.path, wanted, job.gates.path_distance_mm)
+        noticed += choice_findings(contours_of(inputs.part), chosen, inputs.path)
         check_scan_unit(inputs.scan, inputs.part, chosen)
     with clock.step("register", 0.3):
         result = register_contours(chosen, inputs.scan, T_start, method=job.method, settings=job.registration)
@@ -149,11 +147,8 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
         _refuse(gates, RegistrationError)
     with clock.step("correct", 0.55):
         corrected = registration.apply(inputs.path)
-        steps, followed = registration.followed(inputs.path)
-        distance = followed.distance_mm[~inputs.path.rapid[steps.source]]
-        gates += overridden(path_gates(corrected, distance, job.gates), job.override)
+        gates += overridden(path_gates(corrected, corrected.feed_distance_mm, job.gates), job.override)
         _refuse(gates, PathError)
-    noticed += choice_findings(contours_of(inputs.part), chosen, inputs.path)
     findings = (*inputs.part.findings, *inputs.scan.findings, *inputs.path.findings, *noticed, *result.findings)
     findings += tuple(
         Finding(501, Level.WARN, f"gate {gate.name} was overridden: {gate.value:.4g}, limit {gate.limit:g}")

@@ -63,14 +63,7 @@ def register_contours(
     RegistrationError
         If the scan does not show the contours, or the pose is ambiguous.
     """
-    if method not in METHODS:
-        raise ValueError(f"unknown method {method!r}; use one of {', '.join(METHODS)}")
-    if not contours:
-        raise RegistrationError("no contour to register; choose one with --contour")
-    if T_start is not None and not is_rigid(T_start):
-        raise RegistrationError(
-            "the start pose is no rigid motion: a finite 4x4 matrix without scale or mirror is needed"
-        )
+    _check(contours, T_start, method)
     settings = settings or RegistrationSettings()
     nominal = {n: NominalContour(framed(c), c.ring_points_mm, c.ring_normals) for n, c in contours.items()}
     symmetry = None
@@ -97,6 +90,17 @@ def register_contours(
         side,
         _findings(pose, done) + _side_findings(side, scan.normals is not None),
     )
+
+
+def _check(contours: Mapping[int, Contour], T_start: FloatArray | None, method: str) -> None:
+    if method not in METHODS:
+        raise ValueError(f"unknown method {method!r}; use one of {', '.join(METHODS)}")
+    if not contours:
+        raise RegistrationError("no contour to register; choose one with --contour")
+    if T_start is not None and not is_rigid(T_start):
+        raise RegistrationError(
+            "the start pose is no rigid motion: a finite 4x4 matrix without scale or mirror is needed"
+        )
 
 
 def _rigid(

@@ -7,7 +7,7 @@ the corrected contour, and the tool axis turns with the frame. Moves far from th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,6 +44,8 @@ class CorrectedPath:
         One per move.
     added
         (n,) True for moves that are not in the source.
+    feed_distance_mm
+        (m,) distance of the steps of all feed moves from the contours that they follow.
     """
 
     nominal: ToolPath
@@ -51,6 +53,7 @@ class CorrectedPath:
     corrected: ToolPath
     status: tuple[Status, ...]
     added: BoolArray
+    feed_distance_mm: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 def correct_path(
@@ -92,7 +95,8 @@ def correct_path(
     corrected = replace(nominal, tips_mm=tips[kept], axes=axes[kept])
     cuts = np.where(bent[source], cutting, _mostly(cutting, steps, len(path))[source])[kept]
     status = _status(nominal, cuts, assignment.contour[kept], contours)
-    return CorrectedPath(nominal, rigid, corrected, status, steps.fraction[kept] < 1.0)
+    distance = assignment.distance_mm[~path.rapid[source]]
+    return CorrectedPath(nominal, rigid, corrected, status, steps.fraction[kept] < 1.0, distance)
 
 
 def carried(
