@@ -9,13 +9,18 @@ INSTALLED := $(VENV)/.installed
 READY := $(VENV)/.ready
 SYSTEM_PACKAGES := libgl1 libegl1 libx11-6 libxrender1
 
-.PHONY: help demo test check lint clean distclean
+PEERS := .peers
+PEER_SYSTEM_PACKAGES := cloudcompare libgl1 libgomp1 libusb-1.0-0
+
+.PHONY: help demo test check lint bench-accuracy bench-peers peers clean distclean
 
 help:
 	@echo 'make demo       correct the porthole sample: program, pictures and report in out/porthole'
 	@echo 'make test       run all tests'
 	@echo 'make lint       ruff and mypy'
 	@echo 'make check      lint, then test'
+	@echo 'make bench-accuracy  measure every method on every case: docs/accuracy.md and its picture'
+	@echo 'make bench-peers     the same with other libraries beside them, which make peers installs'
 	@echo 'make clean      remove what these commands made; distclean removes .venv too'
 
 demo: $(READY)
@@ -31,12 +36,20 @@ lint: $(INSTALLED)
 
 check: lint test
 
+bench-accuracy: $(INSTALLED)
+	$(RUN) benchmarks/accuracy.py --docs docs
+
+bench-peers: $(INSTALLED) peers
+	$(RUN) benchmarks/accuracy.py --peers --docs docs
+
+peers: $(PEERS)/.installed
+
 clean:
 	rm -rf out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
+	find . -name __pycache__ -not -path './$(VENV)/*' -not -path './$(PEERS)/*' -prune -exec rm -rf {} +
 
 distclean: clean
-	rm -rf $(VENV) sicp_cam.egg-info
+	rm -rf $(VENV) $(PEERS) sicp_cam.egg-info
 
 $(INSTALLED): pyproject.toml
 	@test -n '$(PYTHON)' || { echo 'Python 3.11 or newer is needed: install it, or name it with make PYTHON=FILE' >&2; exit 1; }
@@ -55,3 +68,13 @@ $(READY): $(INSTALLED)
 	$$as_root apt-get update -qq; \
 	$$as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(SYSTEM_PACKAGES); \
 	if $(RUN) -m sicp_cam doctor --quiet; then touch $@; fi
+
+# Other libraries for the benchmark, in an environment of their own; the product needs none of them.
+$(PEERS)/.installed: benchmarks/peers/requirements.txt
+	@test -n '$(PYTHON)' || { echo 'Python 3.11 or newer is needed: install it, or name it with make PYTHON=FILE' >&2; exit 1; }
+	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
+	$(PEERS)/bin/python -m pip install --disable-pip-version-check --quiet --requirement benchmarks/peers/requirements.txt
+	@command -v CloudCompare >/dev/null 2>&1 && $(PEERS)/bin/python -c 'import open3d' 2>/dev/null || \
+		echo 'CloudCompare, or a library that Open3D loads, is missing and will be listed as not measured:' \
+		'install $(PEER_SYSTEM_PACKAGES) (their Debian names) as root' >&2
+	@touch $@

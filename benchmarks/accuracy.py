@@ -1,88 +1,120 @@
-"""Measure the error of corrected paths against the known truth of the samples, method by method.
+"""Measure the error of corrected paths against known truth: every method on every case, other libraries beside them.
 
-    python benchmarks/accuracy.py [--json FILE] [SAMPLE ...]
+    python benchmarks/accuracy.py [--peers] [--docs FOLDER] [--json FILE] [CASE ...]
 
-Prints one row per sample and method: the error across the contour (`normal`) and out of the surface (`out`), both
-together, and of the tool axis, over the cutting moves where the scan shows the edge. Sliding along the contour is not
-an error: it does not change the part.
+Prints one row per case and method, see `truth.error`: `both`, `p95`, `max`, `normal`, `bias`, `out` in mm, `axis` in
+degrees; `paper/` the mean error of the method `paper` over that of the row; `time` the processor time of the
+registration, `seconds`, over that of the method `rigid`. For other libraries `seconds` is wall-clock time. `--docs`
+writes accuracy.md and images/accuracy.png into a folder.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
+from accuracy_document import document
+from accuracy_picture import draw
+from cases import BUILT, SAMPLES, built, sample
+from methods import METHODS, from_files, in_memory
+from peer_runs import PEERS, NotMeasuredError, measured, problem
 
-import sicp_cam
-from sicp_cam.registration.settings import METHODS
+from sicp_cam.errors import SicpError
 
-SAMPLES = Path(__file__).resolve().parent.parent / "samples"
-FILES = {"porthole": "path.apt", "nosecone": "path.apt", "disc": "path.nc"}
-
-
-def errors(sample: str, method: str) -> dict[str, float]:
-    """Return mean, 95th percentile and largest error of one sample and method, in mm and degrees."""
-    folder = SAMPLES / sample
-    result = sicp_cam.correct(
-        cad=folder / "part.step",
-        scan=folder / "scan.ply",
-        path=folder / FILES[sample],
-        align=str(folder / "pose_rough.txt"),
-        method=method,
-        gates__residual_mm=100.0,  # the rigid pose of a bent part is measured here, not used
-    )
-    cuts = np.array([status is not sicp_cam.Status.APPROACH for status in result.corrected.status])
-    path = result.corrected.corrected
-    with np.load(folder / "truth.npz", allow_pickle=False) as truth:
-        return against_truth(path.tips_mm[cuts], path.axes[cuts], dict(truth))
+SEEDS = (1, 2)
+COLUMNS = ("both", "p95", "max", "normal", "bias", "out", "axis", "paper/", "time", "seconds")
 
 
-def against_truth(tips: np.ndarray, axes: np.ndarray, truth: dict[str, np.ndarray]) -> dict[str, float]:
-    """Compare a corrected path with the true edge: from each true point to the nearest place on the path."""
-    points, covered = truth["path_true"], truth["covered"]
-    start, step = tips[:-1], np.diff(tips, axis=0)
-    length2 = np.maximum(np.sum(step * step, axis=1), 1e-18)
-    offset = points[:, None] - start
-    t = np.clip(np.sum(offset * step, axis=2) / length2, 0.0, 1.0)
-    feet = start + t[..., None] * step
-    rows = np.arange(len(points))
-    best = np.argmin(np.sum((feet - points[:, None]) ** 2, axis=2), axis=1)
-    error = feet[rows, best] - points
-    fraction = t[rows, best][:, None]
-    axis = axes[best] * (1.0 - fraction) + axes[best + 1] * fraction
-    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    normal = np.sum(error * truth["inward"], axis=1)[covered]
-    out = np.sum(error * truth["axis_true"], axis=1)[covered]
-    angle = np.degrees(np.arccos(np.clip(np.sum(axis * truth["axis_true"], axis=1), -1.0, 1.0)))[covered]
-    both = np.hypot(normal, out)
-    return {
-        "both_mean_mm": float(both.mean()),
-        "both_p95_mm": float(np.percentile(both, 95)),
-        "both_max_mm": float(both.max()),
-        "normal_mean_mm": float(np.abs(normal).mean()),
-        "normal_bias_mm": float(normal.mean()),
-        "out_mean_mm": float(np.abs(out).mean()),
-        "axis_mean_deg": float(angle.mean()),
+def by_methods(case: str) -> dict[str, dict[str, float] | str]:
+    """Return the row of each method, or why there is none; means over the seeds of a built case, the largest `max`.
+
+    `first` is the mean error with the first seed, which is the one that the peers get.
+    """
+    runs: dict[str, list[dict[str, float]]] = {method: [] for method in METHODS}
+    failed: dict[str, str] = {}
+    for scan in [sample(case)] if case in SAMPLES else [built(case, seed) for seed in SEEDS]:
+        for method in METHODS:
+            try:
+                run = in_memory(scan, method)
+                runs[method].append(run | from_files(case, method) if case in SAMPLES else run)
+            except SicpError as error:
+                failed[method] = f"refused: {error}"
+            except Exception as error:  # a bug of one method must not cost the numbers of all others
+                failed[method] = f"failed: {type(error).__name__}: {error}"
+    rows = {method: failed.get(method) or averaged(runs[method]) for method in METHODS}
+    return {method: compared(row, rows) for method, row in rows.items()}
+
+
+def averaged(runs: list[dict[str, float]]) -> dict[str, float]:
+    """Return the mean of each number of several runs, the largest `max`, and the first `both` as `first`."""
+    mean = {key: float(np.mean([run[key] for run in runs])) for key in runs[0]}
+    return mean | {"max": max(run["max"] for run in runs), "first": runs[0]["both"]}
+
+
+def compared(row: dict[str, float] | str, rows: dict[str, dict[str, float] | str]) -> dict[str, float] | str:
+    """Return a row with its error against that of `paper`, and its time against that of `rigid`."""
+    if isinstance(row, str):
+        return row
+    paper, rigid = rows["paper"], rows["rigid"]
+    return row | {
+        "seconds": row["time"],
+        "paper/": float("nan") if isinstance(paper, str) else paper["both"] / row["both"],
+        "time": float("nan") if isinstance(rigid, str) else row["time"] / rigid["time"],
     }
+
+
+def by_peers(case: str) -> dict[str, dict[str, float | str] | str]:
+    """Return the row of each peer on a case (the first seed of a built one), or why it has none."""
+    scan = sample(case) if case in SAMPLES else built(case, SEEDS[0])
+    given, rows = problem(scan), {}
+    for peer in PEERS:
+        try:
+            rows[peer] = measured(peer, given, scan)
+        except NotMeasuredError as error:
+            rows[peer] = f"not measured: {error}"
+    return rows
+
+
+def show(case: str, rows: dict[str, dict[str, float | str] | str]) -> None:
+    """Print the rows of a case."""
+    for name, row in rows.items():
+        if isinstance(row, str):
+            print(f"{case:14} {name:38} {row}")
+        else:
+            numbers = (row.get(column, float("nan")) for column in COLUMNS)
+            print(f"{case:14} {name:38} " + " ".join(f"{number:8.3f}" for number in numbers), flush=True)
 
 
 def main() -> None:
     """Run the benchmark."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("samples", nargs="*", default=list(FILES))
-    parser.add_argument("--json", type=Path)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=f"all of them: {', '.join([*SAMPLES, *BUILT])}")
+    parser.add_argument("--peers", action="store_true", help="measure other libraries too; make peers installs them")
+    parser.add_argument("--docs", type=Path, help="write accuracy.md and images/accuracy.png here")
+    parser.add_argument("--json", type=Path, help="write every number here")
     options = parser.parse_args()
-    table = {}
-    heads = ("both", "p95", "max", "normal", "bias", "out", "axis/deg")
-    print(f"{'sample':10} {'method':7} " + " ".join(f"{head:>8}" for head in heads))
-    for sample in options.samples:
-        for method in METHODS:
-            row = table[f"{sample} {method}"] = errors(sample, method)
-            print(f"{sample:10} {method:7} " + " ".join(f"{value:8.3f}" for value in row.values()))
+    cases = options.cases or [*SAMPLES, *BUILT]
+    if unknown := set(cases) - {*SAMPLES, *BUILT}:
+        parser.error(f"no case {', '.join(sorted(unknown))}; there are {', '.join([*SAMPLES, *BUILT])}")
+    print(f"{'case':14} {'method':38} " + " ".join(f"{column:>8}" for column in COLUMNS))
+    methods, peers = {}, {}
+    for case in cases:
+        methods[case] = by_methods(case)
+        show(case, methods[case])
+        if options.peers:
+            peers[case] = by_peers(case)
+            show(case, peers[case])
     if options.json:
-        options.json.write_text(json.dumps(table, indent=1) + "\n")
+        text = json.dumps({"methods": methods, "peers": peers}, indent=1, default=str)
+        options.json.write_text(text.replace("NaN", "null") + "\n")
+    if options.docs:
+        (options.docs / "images").mkdir(parents=True, exist_ok=True)
+        command = " ".join(["python", "benchmarks/accuracy.py", *sys.argv[1:]])
+        (options.docs / "accuracy.md").write_text(document(methods, peers, command))
+        draw(methods, peers, options.docs / "images" / "accuracy.png")
 
 
 if __name__ == "__main__":

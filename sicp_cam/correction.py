@@ -252,7 +252,7 @@ def register(
     path
         Chooses the contours: those that it follows.
     method
-        `sicp`, `rigid` or `paper`.
+        `sicp`, `rigid`, `projection` or `paper`.
     align
         (4, 4) rough T_scan_part in mm, or a file as `--align` takes it; None finds it from the geometry.
     contours

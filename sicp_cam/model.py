@@ -282,9 +282,12 @@ class Program:
         (4, 4) pose of the program frame in the scan frame, mm: the identity where all correction is in the points,
         the rigid registration where the program keeps the part's own coordinates.
     notes
-        Lines for the head of the program: what made it, from which inputs, which gates were overridden. No dates.
+        Lines for the head of the program: what made it, from which inputs. No dates.
     columns
         More per-move numbers, such as an uncertainty, for the posts that can carry them.
+    overridden
+        One line for each gate that failed and that the operator overrode: its name, value and limit. Every post writes
+        them.
     """
 
     name: str
@@ -293,6 +296,7 @@ class Program:
     T_scan_program: FloatArray = field(default_factory=lambda: np.eye(4))
     notes: tuple[str, ...] = ()
     columns: Mapping[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
+    overridden: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.status) != len(self.path):

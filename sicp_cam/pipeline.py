@@ -26,7 +26,9 @@ from sicp_cam.registration.register import register_contours
 from sicp_cam.result import Correction, Inputs, input_paths, report_files, told
 from sicp_cam.result_document import output_entry
 from sicp_cam.summary import summary
-from sicp_cam.toolpath.gates import Gate, overridden, path_gates, registration_gates
+from sicp_cam.toolpath.gates import Gate, overridden, value_and_limit
+from sicp_cam.toolpath.path_gates import path_gates
+from sicp_cam.toolpath.registration_gates import registration_gates
 
 __all__ = ["Correction", "Outcome", "Progress", "correct", "run"]
 
@@ -114,6 +116,9 @@ def _corrected_and_written(job: Job, progress: Progress) -> Outcome:
     for finding in correction.findings:
         if finding.level is not Level.INFO:
             _log.log(logging.ERROR if finding in failed else logging.WARNING, "%s", told(finding))
+    for gate in correction.gates:
+        if gate.state == "warn":
+            _log.warning("%s", _gate_line(gate))
     progress("done", 1.0)
     return Outcome(document, 8 if failed else 0, tuple(summary(correction, list(programs), list(reports))))
 
@@ -143,7 +148,7 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
     with clock.step("register", 0.3):
         result = register_contours(chosen, inputs.scan, T_start, method=job.method, settings=job.registration)
         registration = PartRegistration(result, job.toolpath, job.gates)
-        gates = overridden(registration_gates(result, job.gates), job.override)
+        gates = overridden(registration_gates(result, job.gates, T_start), job.override)
         _refuse(gates, RegistrationError)
     with clock.step("correct", 0.55):
         corrected = registration.apply(inputs.path)
@@ -151,7 +156,7 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
         _refuse(gates, PathError)
     findings = (*inputs.part.findings, *inputs.scan.findings, *inputs.path.findings, *noticed, *result.findings)
     findings += tuple(
-        Finding(501, Level.WARN, f"gate {gate.name} was overridden: {gate.value:.4g}, limit {gate.limit:g}")
+        Finding(501, Level.WARN, f"gate {gate.name} was overridden: {value_and_limit(gate)}")
         for gate in gates
         if gate.state == "overridden"
     )
@@ -196,17 +201,22 @@ def _read(job: Job) -> Inputs:
 def _refuse(gates: tuple[Gate, ...], error: type[RegistrationError] | type[PathError]) -> None:
     failed = [gate for gate in gates if gate.state == "fail"]
     if failed:
-        told = [f"{gate.name}: {gate.text} is {gate.value:.4g}, limit {gate.limit:g}" for gate in failed]
+        told = [_gate_line(gate) for gate in failed]
         names = " ".join(f"--override {gate.name}" for gate in failed)
         raise error(f"no program: {'; '.join(told)}; look at the scan and the start pose, or allow it with {names}")
+
+
+def _gate_line(gate: Gate) -> str:
+    return f"{gate.name}: {gate.text}: {value_and_limit(gate)}"
 
 
 def _judge_warnings(correction: Correction) -> None:
     if not correction.job.strict:
         return
-    warnings = [finding for finding in correction.findings if finding.level is Level.WARN]
+    warnings = [told(finding) for finding in correction.findings if finding.level is Level.WARN]
+    warnings += [_gate_line(gate) for gate in correction.gates if gate.state == "warn"]
     if warnings:
-        raise WarningsError(f"no program, because of --strict: {'; '.join(told(finding) for finding in warnings)}")
+        raise WarningsError(f"no program, because of --strict: {'; '.join(warnings)}")
 
 
 def _names_known_before(job: Job) -> list[str]:

@@ -15,7 +15,8 @@ from sicp_cam.correction import PartRegistration, contours_of
 from sicp_cam.errors import ReportError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
-from sicp_cam.model import Part, Program, Scan, ToolPath
+from sicp_cam.model import FloatArray, Part, Program, Scan, ToolPath
+from sicp_cam.report.statistics import uncertainty_summary
 from sicp_cam.result_document import (
     SCHEMA,
     correction_entry,
@@ -24,13 +25,17 @@ from sicp_cam.result_document import (
     input_entry,
     registration_entry,
     status,
+    uncertainty_words,
     versions,
 )
 from sicp_cam.rigid_motion import apply, inverse, rotate
-from sicp_cam.toolpath.gates import Gate
+from sicp_cam.toolpath.gates import Gate, value_and_limit
 from sicp_cam.toolpath.transfer import CorrectedPath
 
 __all__ = ["Correction", "Inputs", "input_paths", "report_files", "told"]
+
+NO_UNCERTAINTY = -1.0
+"""Stands under the mask of a column: no one who drops the mask can take it for an uncertainty."""
 
 _log = logging.getLogger(__name__)
 
@@ -77,7 +82,8 @@ class Correction:
         coverage = min(float(contour.covered.mean()) for contour in self.registration.result.contours)
         return (
             f"<Correction {status(self.findings, self.gates)}: {len(self.corrected.nominal)} moves, method"
-            f" {self.job.method}, {100.0 * coverage:.1f} % of the edge seen>"
+            f" {self.job.method}, {100.0 * coverage:.1f} % of the edge seen,"
+            f" {uncertainty_words(uncertainty_summary(self.registration.result.contours))}>"
         )
 
     @property
@@ -88,7 +94,13 @@ class Correction:
             T = self.registration.result.T_scan_part
             back = inverse(T)
             path = replace(path, tips_mm=apply(back, path.tips_mm), axes=rotate(back, path.axes))
-        return Program(self.job.name, path, self.corrected.status, T, tuple(_notes(self)))
+        broken = tuple(
+            f"gate {gate.name} overridden by the operator: {value_and_limit(gate)}"
+            for gate in self.gates
+            if gate.state == "overridden"
+        )
+        notes, columns = tuple(_notes(self)), _columns(self.corrected)
+        return Program(self.job.name, path, self.corrected.status, T, notes, columns, broken)
 
     def files(
         self, post: str, options: Mapping[str, object] | None = None
@@ -138,7 +150,7 @@ class Correction:
             ],
             "outputs": outputs or [],
             "registration": registration_entry(self.registration.result),
-            "uncertainty": None,
+            "uncertainty": uncertainty_summary(self.registration.result.contours),
             "correction": correction_entry(self.corrected),
             "gates": gate_list(self.gates),
             "timing_s": dict(self.timing_s),
@@ -165,6 +177,14 @@ def input_paths(job: Job) -> list[Path]:
     return [job.cad, job.scan, job.path, *([job.align] if isinstance(job.align, Path) else [])]
 
 
+def _columns(corrected: CorrectedPath) -> dict[str, FloatArray]:
+    """Return the uncertainty of each move as a column, masked where there is none; no column where none is stated."""
+    if corrected.u_mm is None:
+        return {}
+    none = np.isnan(corrected.u_mm)
+    return {"u_mm": np.ma.array(np.where(none, NO_UNCERTAINTY, corrected.u_mm), mask=none)}
+
+
 def _notes(correction: Correction) -> Iterator[str]:
     """Give the lines for the head of a program: no date, so that the same inputs give the same bytes."""
     result = correction.registration.result
@@ -173,9 +193,6 @@ def _notes(correction: Correction) -> Iterator[str]:
     for role, source in (("part", inputs.part.source), ("scan", inputs.scan.source), ("path", inputs.path.source)):
         if source is not None:
             yield f"{role} {Path(source.path).name} sha256 {source.sha256[:16]}"
-    for gate in correction.gates:
-        if gate.state == "overridden":
-            yield f"gate {gate.name} overridden by the operator: {gate.value:.4g}, limit {gate.limit:g}"
 
 
 def report_files(

@@ -13,7 +13,7 @@ import numpy as np
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import Source
 from sicp_cam.registration.result import Registration
-from sicp_cam.report.statistics import all_contours, residual_summary
+from sicp_cam.report.statistics import all_contours, leave_out_summary, residual_summary, uncertainty_summary
 from sicp_cam.toolpath.gates import Gate
 from sicp_cam.toolpath.transfer import CorrectedPath
 
@@ -26,6 +26,7 @@ __all__ = [
     "output_entry",
     "registration_entry",
     "status",
+    "uncertainty_words",
     "versions",
 ]
 
@@ -81,7 +82,7 @@ def output_entry(kind: str, path: str, content: bytes) -> dict[str, Any]:
 
 
 def registration_entry(registration: Registration) -> dict[str, Any]:
-    """Return the registration: pose, contours, and residuals of the rigid pose and of the method."""
+    """Return the registration: pose, contours, residuals of the rigid pose and of the method, and how halves agree."""
     before, after, covered = all_contours(registration.contours)
     return {
         "method": registration.method,
@@ -93,6 +94,8 @@ def registration_entry(registration: Registration) -> dict[str, Any]:
                 "segments": len(contour.segments),
                 "coverage": float(contour.covered.mean()),
                 "symmetric": contour.symmetric,
+                "uncertainty": uncertainty_summary([contour]),
+                "leave_out": leave_out_summary([contour]),
             }
             for contour in registration.contours
         ],
@@ -103,8 +106,27 @@ def registration_entry(registration: Registration) -> dict[str, Any]:
         "side_ratio": registration.side,
         "rigid": residual_summary(before, covered),
         "corrected": residual_summary(after, covered),
-        "leave_out": None,
+        "leave_out": leave_out_summary(registration.contours),
     }
+
+
+def uncertainty_words(uncertainty: Mapping[str, Any] | None) -> str:
+    """Return the stated uncertainty of the contours, see `uncertainty_summary`, in words.
+
+    >>> uncertainty_words({"mean_mm": 0.0512, "max_mm": 0.09, "bridged": {"mean_mm": 0.2, "max_mm": 0.31}})
+    'stated uncertainty 0.051 mm (1 sigma), largest 0.090 mm, where bridged 0.310 mm'
+    >>> uncertainty_words(None)
+    'no uncertainty stated'
+    """
+    if uncertainty is None:
+        return "no uncertainty stated"
+    if uncertainty["mean_mm"] is None:
+        return "the uncertainty could not be measured"
+    words = f"stated uncertainty {uncertainty['mean_mm']:.3f} mm (1 sigma), largest {uncertainty['max_mm']:.3f} mm"
+    if uncertainty["bridged"] is None:
+        return words
+    bridged = uncertainty["bridged"]["max_mm"]
+    return f"{words}, where bridged {'not known' if bridged is None else f'{bridged:.3f} mm'}"
 
 
 def correction_entry(corrected: CorrectedPath) -> dict[str, Any]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from sicp_cam import output
+from sicp_cam.report.statistics import uncertainty_summary
 from sicp_cam.result import Correction
-from sicp_cam.result_document import registration_entry, status
+from sicp_cam.result_document import registration_entry, status, uncertainty_words
 
 __all__ = ["summary"]
 
@@ -18,7 +19,8 @@ def summary(correction: Correction, programs: list[str], reports: list[str]) -> 
     coverage = min(contour["coverage"] for contour in entry["contours"])
     yield (
         f"{verdict}: {len(correction.corrected.nominal)} moves corrected with {job.method};"
-        f" the scan shows {100.0 * coverage:.1f} % of the edge"
+        f" the scan shows {100.0 * coverage:.1f} % of the edge;"
+        f" {uncertainty_words(uncertainty_summary(correction.registration.result.contours))}"
     )
     i, j, k = correction.corrected.corrected.axes.mean(axis=0)
     yield f"the tool comes from ({i:.2f}, {j:.2f}, {k:.2f}) in the scan frame; check that this is the outer side"

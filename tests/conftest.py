@@ -35,15 +35,33 @@ class Outline:
 
     def sampled(self, step_mm, start_mm=0.0):
         """Return points, tangents and inward directions about every `step_mm`."""
+        i = self.samples(step_mm, start_mm)
+        return self.points[i], self.tangents[i], self.inward[i]
+
+    def samples(self, step_mm, start_mm=0.0):
+        """Return the indices of the points about every `step_mm`."""
         count = round(self.length_mm / step_mm)
         s = np.linspace(0.0, self.length_mm, count + (not self.closed), endpoint=not self.closed) + start_mm
         i = np.round(s / self.length_mm * (len(self.points) - (not self.closed))).astype(int)
-        i = i % len(self.points) if self.closed else np.minimum(i, len(self.points) - 1)
-        return self.points[i], self.tangents[i], self.inward[i]
+        return i % len(self.points) if self.closed else np.minimum(i, len(self.points) - 1)
+
+    @property
+    def corners(self):
+        """Indices of the points at which the travel turns by more than 15 degrees at once."""
+        step = np.diff(np.vstack([self.points, self.points[:1]]), axis=0)
+        step /= np.linalg.norm(step, axis=1, keepdims=True)
+        turns = np.sum(step * np.roll(step, 1, axis=0), axis=1) < np.cos(np.radians(15.0))
+        return np.flatnonzero(turns) if self.closed else np.flatnonzero(turns[1:-1]) + 1
 
     def depth(self, uv):
-        """Return depth into the material and arc length of the nearest place, for (n, 2) points."""
-        _, i = cKDTree(self.points).query(uv)
+        """Return depth into the material and arc length of the nearest place, for (n, 2) points.
+
+        Further away than 5 mm the nearest of every tenth place will do: searching the middle of a hole takes long.
+        """
+        far, i = cKDTree(self.points[::10]).query(uv)
+        i = 10 * i
+        near = far < 5.0
+        i[near] = cKDTree(self.points).query(uv[near])[1]
         return np.sum((uv - self.points[i]) * self.inward[i], axis=1), i * self.length_mm / len(self.points)
 
 
@@ -83,6 +101,13 @@ def egg(size, **options):
     )
 
 
+def lopsided(size, **options):
+    """Return an outline that falls onto itself neither turned nor turned over."""
+    return polar(
+        lambda angle: size * (1.0 + 0.15 * np.cos(2 * angle) + 0.1 * np.cos(3 * angle - 0.25 * np.pi)), **options
+    )
+
+
 def rounded_rectangle(width, height, radius, *, hole=False):
     a, b = 0.5 * width - radius, 0.5 * height - radius
     turn = np.linspace(0.0, 0.5 * np.pi, 2000)
@@ -98,6 +123,17 @@ def wavy_edge(length, amplitude=6.0):
     """Return an open edge along u with the material above it."""
     u = np.linspace(-0.5 * length, 0.5 * length, 100_000)
     return outline_of(np.stack([u, amplitude * np.sin(2.0 * np.pi * u / length)], axis=1), False)
+
+
+def stretch(outline, start_mm, end_mm):
+    """Return the open part of an outline between two arc lengths."""
+    first, last = (round(s / outline.length_mm * len(outline.points)) for s in (start_mm, end_mm))
+    return Outline(outline.points[first:last], outline.tangents[first:last], end_mm - start_mm, False)
+
+
+def across(outline, width_mm):
+    """Return the other edge of a flange: parallel to a closed outline, its material on the other side."""
+    return outline_of((outline.points + width_mm * outline.inward)[::-1], True)
 
 
 def plane(uv):
@@ -120,6 +156,10 @@ def bent(sheet, rise):
     return lambda uv: sheet(uv) + rise(uv[:, 0], uv[:, 1])[:, None] * frame(sheet, uv)[2]
 
 
+def shifted(sheet, by_mm):
+    return lambda uv: sheet(uv) + by_mm
+
+
 def frame(sheet, uv):
     """Return dS/du, dS/dw and the unit normal at (n, 2) places, by central differences."""
     h = 1e-2
@@ -128,16 +168,24 @@ def frame(sheet, uv):
     return du, dw, normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
-def contour(outline, sheet=plane, *, step_mm=1.0, start_mm=0.0, rings_mm=(10.0, 30.0), ring_step_mm=10.0):
-    """Lay an outline on a sheet, as a CAD reader would hand it over."""
+def contour(outline, sheet=plane, *, step_mm=1.0, start_mm=0.0, rings_mm=(10.0, 30.0), ring_step_mm=10.0, others=()):
+    """Lay an outline on a sheet, as a CAD reader would hand it over; `others` are the part's other edges."""
     uv, tangent, _ = outline.sampled(step_mm, start_mm)
     du, dw, normals = frame(sheet, uv)
     tangents = tangent[:, :1] * du + tangent[:, 1:] * dw
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     place, _, inward = outline.sampled(ring_step_mm)
     ring = np.concatenate([place + depth * inward for depth in rings_mm]) if rings_mm else np.zeros((0, 2))
+    for other in others:
+        ring = ring[other.depth(ring)[0] > 0.0]
     return Contour(
-        sheet(uv), tangents, normals, outline.closed, ring_points_mm=sheet(ring), ring_normals=frame(sheet, ring)[2]
+        sheet(uv),
+        tangents,
+        normals,
+        outline.closed,
+        corners=np.flatnonzero(np.isin(outline.samples(step_mm, start_mm), outline.corners)),
+        ring_points_mm=sheet(ring),
+        ring_normals=frame(sheet, ring)[2],
     )
 
 
@@ -160,8 +208,34 @@ def material(outlines, *, sampling="jittered", spacing_mm=2.0, depth_mm=60.0, se
         axes = [np.arange(a, b, spacing_mm) for a, b in zip(low, high, strict=True)]
         uv = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2) + rng.uniform(0, spacing_mm, 2)
         uv += rng.uniform(-0.5, 0.5, uv.shape) * jitter * spacing_mm
+    return of_material(uv, outlines, depth_mm)
+
+
+def of_material(uv, outlines, depth_mm):
+    """Keep the (n, 2) places inside the material of every outline, and within a depth of one of them."""
     depths = np.stack([outline.depth(uv)[0] for outline in outlines])
     return uv[(depths > 0.0).all(axis=0) & (depths.min(axis=0) < depth_mm)]
+
+
+def rows(outlines, *, along_mm=0.25, gap_mm=2.0, degrees=0.0, start_mm=0.0, depth_mm=40.0, seed=0):
+    """Sample the plane as a line scanner does: points close together in rows far apart, `degrees` from the u axis.
+
+    A row lies at `start_mm` from the origin; each row starts at a place of its own.
+    """
+    rng = np.random.default_rng(seed)
+    reach = max(np.linalg.norm(outline.points, axis=1).max() for outline in outlines) + depth_mm
+    along, over = np.arange(-reach, reach, along_mm), np.arange(-reach // gap_mm, reach // gap_mm) * gap_mm + start_mm
+    places = np.stack(np.meshgrid(along, over), axis=-1)
+    places[..., 0] += rng.uniform(0.0, along_mm, len(over))[:, None]
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return of_material(places.reshape(-1, 2) @ np.array([[c, s], [-s, c]]), outlines, depth_mm)
+
+
+def strays(outline, count, *, reach_mm=3.0, seed=0):
+    """Return (count, 2) places outside of the material within reach of its edge: a scanner's mixed pixels."""
+    rng = np.random.default_rng(seed)
+    i = rng.integers(0, len(outline.points), count)
+    return outline.points[i] - rng.uniform(0.0, reach_mm, (count, 1)) * outline.inward[i]
 
 
 def thinned(uv, cell_mm, seed):

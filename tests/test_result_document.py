@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from sicp_cam.contour.frames import FramedCurve
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import Source, Status, ToolPath
-from sicp_cam.registration.result import RegisteredContour, Registration, Residuals, Segment
+from sicp_cam.registration.result import LeaveOut, RegisteredContour, Registration, Residuals, Segment
 from sicp_cam.result_document import (
     SCHEMA,
     correction_entry,
@@ -20,6 +21,7 @@ from sicp_cam.result_document import (
     output_entry,
     registration_entry,
     status,
+    uncertainty_words,
     versions,
 )
 from sicp_cam.toolpath.gates import Gate
@@ -148,6 +150,49 @@ def test_a_registration_is_told_with_its_residuals_over_what_the_scan_shows():
 def test_residuals_that_nobody_measured_are_none_and_not_nan():
     entry = dumped(registration_entry(registration(contour(1, [np.nan], [np.nan], [0]))))
     assert entry["corrected"] == {"normal": None, "out": None, "both": None}
+
+
+def sure(number, u_mm, covered, halves):
+    k = len(covered)
+    made = contour(number, np.zeros(k), np.zeros(k), covered)
+    return replace(made, normal_u_mm=np.array(u_mm, float), out_u_mm=np.zeros(k), leave_out=halves)
+
+
+def test_uncertainty_and_leave_out_stand_at_each_contour_and_the_worst_at_the_top():
+    first = sure(3, [0.1, 0.3, 0.8], [1, 1, 0], LeaveOut(0.03, 0.04))
+    second = sure(7, [0.2], [1], LeaveOut(0.06, 0.08))
+    entry = dumped(registration_entry(registration(first, second)))
+    assert entry["leave_out"] == {"normal": 0.06, "out": 0.08, "both": pytest.approx(0.1)}
+    one, other = entry["contours"]
+    assert one["leave_out"]["both"] == pytest.approx(0.05)
+    assert (one["uncertainty"]["mean_mm"], one["uncertainty"]["max_mm"]) == (pytest.approx(0.2), 0.3)
+    assert one["uncertainty"]["bridged"]["max_mm"] == 0.8
+    assert other["uncertainty"]["bridged"] is None
+
+
+def test_a_method_that_states_nothing_has_null():
+    entry = dumped(registration_entry(registration(contour(1, [0.1], [0.1], [1]))))
+    assert entry["leave_out"] is None
+    assert entry["contours"][0]["uncertainty"] is None and entry["contours"][0]["leave_out"] is None
+
+
+@pytest.mark.parametrize(
+    ("uncertainty", "words"),
+    [
+        (None, "no uncertainty stated"),
+        (
+            {"mean_mm": 0.0504, "max_mm": 0.0907, "bridged": None},
+            "stated uncertainty 0.050 mm (1 sigma), largest 0.091 mm",
+        ),
+        (
+            {"mean_mm": 0.05, "max_mm": 0.09, "bridged": {"mean_mm": None, "max_mm": None}},
+            "stated uncertainty 0.050 mm (1 sigma), largest 0.090 mm, where bridged not known",
+        ),
+        ({"mean_mm": None, "max_mm": None, "bridged": None}, "the uncertainty could not be measured"),
+    ],
+)
+def test_the_uncertainty_in_words(uncertainty, words):
+    assert uncertainty_words(uncertainty) == words
 
 
 def corrected(change, axes=None, words=None, added=None):

@@ -33,7 +33,7 @@ def failures(findings: Iterable[Finding]) -> list[Finding]:
 
 def head_remarks(program: Program) -> list[str]:
     """Return what the head of every program says: its name, what made it from what, and that it protects nobody."""
-    return [program.name, *program.notes, SAFETY_NOTE]
+    return [program.name, *program.notes, *program.overridden, SAFETY_NOTE]
 
 
 class Postprocessor(ABC):

@@ -7,23 +7,27 @@ from collections import Counter
 import numpy as np
 
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import Program
+from sicp_cam.model import FloatArray, Program
 from sicp_postprocessors.base import Postprocessor
 from sicp_postprocessors.checks import frame_findings, name_findings
 from sicp_postprocessors.numbers import rounded
-from sicp_postprocessors.text import counted, file_stem
+from sicp_postprocessors.text import ascii_line, counted, file_stem
 
 __all__ = ["COLUMNS", "PathCsv"]
 
 COLUMNS = ("x", "y", "z", "i", "j", "k", "feed", "rapid", "status")
 _POSITION_DECIMALS, _AXIS_DECIMALS, _FEED_DECIMALS, _COLUMN_DECIMALS = 4, 7, 4, 6
 _CHUNK_ROWS = 4096
+_NOT_IN_A_CELL = ",;\"'"
+_LONGEST_OVERRIDE = 100
 
 
 class PathCsv(Postprocessor):
     """Table of tips in mm, axes from tip to holder, feeds in mm/min, rapid 0 or 1, and status.
 
-    The columns of the program follow in their order. Dots for decimals, commas between cells, one header line.
+    The columns of the program follow in their order, and, where gates were overridden, one whose name says which: a
+    line before the header would be read as the header. A column that is a masked array has empty cells where it is
+    masked: there is no value. Dots for decimals, commas between cells, one header line.
     """
 
     name = "csv"
@@ -58,17 +62,32 @@ class PathCsv(Postprocessor):
                 rounded(path.feeds_mm_min, _FEED_DECIMALS),
             ]
         )
-        extras = [rounded(np.asarray(c, np.float64), _COLUMN_DECIMALS).tolist() for c in program.columns.values()]
+        extras = [_column_cells(column) for column in program.columns.values()]
         row = ",".join(
             [f"%.{_POSITION_DECIMALS}f"] * 3
             + [f"%.{_AXIS_DECIMALS}f"] * 3
             + [f"%.{_FEED_DECIMALS}f", "%d", "%s"]
-            + [f"%.{_COLUMN_DECIMALS}f"] * len(extras)
+            + ["%s"] * len(extras)
+            + ["1"] * bool(program.overridden)
         )
         cells = zip(*numbers.T.tolist(), path.rapid.tolist(), program.status, *extras, strict=True)
         flat = [cell for line in cells for cell in line]
-        table = ",".join((*COLUMNS, *program.columns)) + "\n" + _formatted(row + "\n", flat, len(COLUMNS) + len(extras))
+        head = ",".join((*COLUMNS, *program.columns, *_overridden_column(program)))
+        table = head + "\n" + _formatted(row + "\n", flat, len(COLUMNS) + len(extras))
         return {f"{file_stem(program.name)}.csv": table.encode("ascii")}
+
+
+def _column_cells(column: FloatArray) -> list[str]:
+    """Return the cells of a further column, empty where it is masked."""
+    values = rounded(np.asarray(column, np.float64), _COLUMN_DECIMALS).tolist()
+    masked = np.ma.getmaskarray(column).tolist()
+    return ["" if none else f"{value:.{_COLUMN_DECIMALS}f}" for value, none in zip(values, masked, strict=True)]
+
+
+def _overridden_column(program: Program) -> list[str]:
+    """Return the name of the column that says which gates were overridden, if any, without what ends a cell."""
+    lines = [ascii_line(line, drop=_NOT_IN_A_CELL)[:_LONGEST_OVERRIDE] for line in program.overridden]
+    return [f"overridden: {' and '.join(lines)}"] if lines else []
 
 
 def _formatted(row: str, cells: list[object], width: int) -> str:

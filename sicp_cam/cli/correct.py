@@ -79,7 +79,7 @@ def correct(
     name
         Stem of the output files and name of the program.
     method
-        How the deformation is found: sicp, rigid, paper.
+        How the deformation is found: sicp, rigid, projection, paper.
     contour
         Contours to register: auto, or their numbers separated by commas (see sicp-cam inspect).
     align

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sicp_cam.model import FloatArray, IntArray
+from sicp_cam.model import BoolArray, FloatArray, IntArray
 
-__all__ = ["Rim", "cloud_rim", "mesh_boundary_edges", "mesh_rim", "surface_normals"]
+__all__ = [
+    "LocalPlanes",
+    "Rim",
+    "cloud_rim",
+    "local_planes",
+    "mesh_boundary_edges",
+    "mesh_rim",
+    "surface_normals",
+    "without",
+]
+
+Array = TypeVar("Array", FloatArray, IntArray)
 
 NEIGHBOURS = 16
 OPEN_ANGLE = np.radians(120.0)
@@ -33,6 +45,27 @@ class Rim:
     indices: IntArray
     points_mm: FloatArray
     open_directions: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalPlanes:
+    """The plane of each of n points and its neighbours.
+
+    Parameters
+    ----------
+    neighbours, distances_mm
+        (n, k) indices, the point itself first, and how far they are.
+    normals, centres_mm
+        (n, 3) unit normals of arbitrary side, and centroids.
+    radii_mm
+        (n,) distance of the furthest neighbour from the centroid.
+    """
+
+    neighbours: IntArray
+    distances_mm: FloatArray
+    normals: FloatArray
+    centres_mm: FloatArray
+    radii_mm: FloatArray
 
 
 def mesh_boundary_edges(faces: IntArray) -> IntArray:
@@ -81,14 +114,58 @@ def surface_normals(neighbours_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
     return vectors[:, :, 0], centres
 
 
-def cloud_rim(points_mm: FloatArray, tree: cKDTree) -> Rim:
+def local_planes(points_mm: FloatArray, tree: cKDTree) -> LocalPlanes:
+    """Fit a plane to each of (n, 3) points and its neighbours."""
+    distances, near = tree.query(points_mm, k=min(NEIGHBOURS + 1, len(points_mm)), workers=-1)
+    return _planes(points_mm, near, distances)
+
+
+def without(planes: LocalPlanes, points_mm: FloatArray, tree: cKDTree, dropped: BoolArray) -> LocalPlanes:
+    """Return the planes of the points that are not dropped, as if the dropped ones had never been there.
+
+    Parameters
+    ----------
+    planes
+        Of all n points.
+    points_mm, tree
+        (m, 3) points that are left, and their k-d tree.
+    dropped
+        (n,) True for the others.
+    """
+    number = np.cumsum(~dropped) - 1
+    touched = np.any(dropped[planes.neighbours[~dropped]], axis=1)
+    distances, near = tree.query(points_mm[touched], k=min(planes.neighbours.shape[1], len(points_mm)))
+    anew = _planes(points_mm, near, distances)
+
+    def renewed(values: Array, new: Array) -> Array:
+        kept: Array = values[~dropped]
+        kept[touched] = new
+        return kept
+
+    return LocalPlanes(
+        renewed(number[planes.neighbours], anew.neighbours),
+        renewed(planes.distances_mm, anew.distances_mm),
+        renewed(planes.normals, anew.normals),
+        renewed(planes.centres_mm, anew.centres_mm),
+        renewed(planes.radii_mm, anew.radii_mm),
+    )
+
+
+def _planes(points_mm: FloatArray, near: IntArray, distances_mm: FloatArray) -> LocalPlanes:
+    groups = points_mm[near]
+    normals, centres = surface_normals(groups)
+    away = groups - centres[:, None]
+    radii = np.sqrt(np.einsum("nki,nki->nk", away, away).max(axis=1, initial=0.0))
+    return LocalPlanes(near, distances_mm, normals, centres, radii)
+
+
+def cloud_rim(points_mm: FloatArray, planes: LocalPlanes) -> Rim:
     """Find the rim of an (n, 3) cloud by the open angle that a point's neighbours leave in its tangent plane.
 
     No two points may be equal: copies would take the places of neighbours and have no direction.
     """
-    _, near = tree.query(points_mm, k=min(NEIGHBOURS + 1, len(points_mm)))
-    offsets = points_mm[near[:, 1:]] - points_mm[:, None]
-    N, _ = surface_normals(points_mm[near])
+    offsets = points_mm[planes.neighbours[:, 1:]] - points_mm[:, None]
+    N = planes.normals
     first = _unit(np.cross(N, _least_aligned_axis(N)))
     second = np.cross(N, first)
     angle = np.sort(

@@ -69,7 +69,7 @@ class Job:
     name
         Stem of the output files, and name of the program.
     method
-        How the deformation is found: sicp, rigid or paper.
+        How the deformation is found: sicp, rigid, projection or paper.
     contour
         Numbers of the contours to be registered, or auto: those that the path follows.
     align

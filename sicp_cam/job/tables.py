@@ -26,9 +26,20 @@ TABLES: Mapping[str, Any] = MappingProxyType(
 
 RANGES: Mapping[str, Mapping[str, Range]] = MappingProxyType(
     {
-        "registration": {"segments": (1, 10_000), "overlap": (0.0, 0.5), "reach_mm": (0.01, 1e4)},
+        "registration": {
+            "segments": (1, 10_000),
+            "overlap": (0.0, 0.5),
+            "reach_mm": (0.01, 1e4),
+            "edge_offset_mm": (-10.0, 10.0),
+        },
         "toolpath": {"feed_mm_min": (1e-3, 1e6), "step_mm": (1e-3, 1e3), "chord_mm": (1e-5, 10.0)},
-        "gates": {"coverage": (0.0, 1.0), "path_coverage": (0.0, 1.0), "axis_deg": (0.0, 180.0)},
+        "gates": {
+            "coverage": (0.0, 1.0),
+            "path_coverage": (0.0, 1.0),
+            "pose_deg": (0.0, 180.0),
+            "axis_deg": (0.0, 180.0),
+            "travel": (0.0, 1.0),
+        },
         "limits": {f.name: (1.0, float("inf")) for f in fields(Limits)},
     }
 )

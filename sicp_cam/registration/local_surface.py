@@ -1,105 +1,156 @@
-"""The scan's surface beside a curve: a robust local polynomial at every station.
+"""The scan's surface beside a curve: a robust quadratic in depth whose coefficients are smooth along the curve.
 
-In the frames of the curve a point lies at depth h into the material, height v out of the surface, and distance d along
-the curve from a station. Each station fits v = a + b h + c h^2 + e d + f d^2 + g d h by weighted least squares,
-Gaussian in d. The terms in d keep the fit unbiased beside gaps and where the curve does not yet follow the bend.
+In the frames of the curve a point lies at arc length s, depth h into the material and height v out of the surface.
+Near the rim, g = h - rim(s), the surface is
+
+    v = a(s) + b(s) g + c(s) g^2,
+
+a, b and c cubic splines of s. The coefficients minimise
+
+    sum w (v - fit)^2 / noise^2 + stiffness * integral (a''^2 + b''^2 + c''^2) ds,
+
+g in units of the band's depth; the weights w are Tukey's. The stiffness is the one of largest marginal
+likelihood (Wahba 1985; Wood 2011): the data choose how far along the curve they are averaged.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
-from sicp_cam.contour.frames import FramedCurve
-from sicp_cam.contour.projection import CurveCoordinates
+from sicp_cam.contour.splines import CurveSplines, LocalRows
 from sicp_cam.model import BoolArray, FloatArray
 from sicp_cam.registration.gauss_newton import tukey
-from sicp_cam.registration.stations import interpolated, windows
+from sicp_cam.registration.likelihood import most_likely
 
-__all__ = ["LocalSurface", "fit_surface"]
+__all__ = ["LocalSurface", "band_depth_mm", "fit_surface"]
 
-DEPTH_SPACINGS = 10.0
-"""Depth of the band of scan points that the surface is fitted to, in point spacings."""
-WIDTH_SPACINGS = 4.0
-"""Standard deviation of the window along the contour, in point spacings."""
+DEPTH_SPACINGS, LEAST_DEPTH_MM = 10.0, 6.0
+"""Depth of the band of scan points that the surface is fitted to; of a fine scan it is as deep as its slope needs."""
+OUTSIDE_SPACINGS = 2.0
 ROUNDS = 3
-LEAST_POINTS = 20.0
-POWERS_D = np.array([0, 0, 0, 1, 2, 1])
-POWERS_H = np.array([0, 1, 2, 0, 0, 1])
+ROBUST = 4.7
+SHAPE_DOUBT = 0.1
+"""Standard uncertainty that the quadratic itself adds, over the noise: a scan bends in more ways than it can follow."""
+LEAST_NOISE_MM = 1e-4
+RIDGE = 1e-6
+"""Information added to every coefficient, far below that of one point: it only keeps empty stretches solvable."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalSurface:
-    """Height of the scan surface over the curve, v = a + b h + c h^2, at each of k stations.
+    """Height of the scan surface over the curve beside its rim.
 
     Parameters
     ----------
+    splines
+        Basis along the curve, K functions.
     coefficients
-        (k, 3) a in mm, b, c in 1/mm; NaN where too few points are near.
+        (3, K) of a in mm, b, and c in 1/mm.
+    information
+        (3 K, 3 K) inverse of their covariance, the coefficients scaled by powers of `band_mm`.
+    band_mm
+        Depth of the band.
     on_surface
         (n,) True for the scan points that lie on the fitted surface, within its noise.
     noise_mm
         Standard deviation of single points from it.
+    stiffness
+        What the data chose.
+    halves_mm
+        Root mean square difference at the rim between the fits to every other point and to the rest.
     """
 
+    splines: CurveSplines
     coefficients: FloatArray
+    information: FloatArray
+    band_mm: float
     on_surface: BoolArray
     noise_mm: float
+    stiffness: float
+    halves_mm: float
 
-    def height_mm(self, depth_mm: FloatArray) -> FloatArray:
-        """Return the height at a depth for each station."""
-        a, b, c = self.coefficients.T
-        height: FloatArray = a + b * depth_mm + c * depth_mm**2
-        return height
+    def height_and_slope(self, s_mm: FloatArray, g_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the height and dv/dh at n arc lengths and depths behind the rim."""
+        a, b, c = self.splines.at(s_mm).times(self.coefficients.T).T
+        return a + b * g_mm + c * g_mm**2, b + 2.0 * c * g_mm
 
-    def slope(self, depth_mm: FloatArray) -> FloatArray:
-        """Return dv/dh at a depth for each station."""
-        slope: FloatArray = self.coefficients[:, 1] + 2.0 * self.coefficients[:, 2] * depth_mm
-        return slope
+    def uncertainty_mm(self, s_mm: FloatArray, g_mm: FloatArray) -> FloatArray:
+        """Return the standard uncertainty of the height at n arc lengths and depths behind the rim."""
+        rows = _rows(self.splines, s_mm, g_mm / self.band_mm).dense()
+        spread = cho_solve(cho_factor(self.information), rows.T)
+        return np.asarray(np.sqrt(np.einsum("ij,ji->i", rows, spread) + (SHAPE_DOUBT * self.noise_mm) ** 2))
+
+
+def band_depth_mm(spacing_mm: float) -> float:
+    """Return the depth of the band of scan points that a surface is fitted to."""
+    return max(DEPTH_SPACINGS * spacing_mm, LEAST_DEPTH_MM)
 
 
 def fit_surface(
-    seen: CurveCoordinates, stations: FloatArray, curve: FramedCurve, spacing_mm: float, reach_mm: float
+    s_mm: FloatArray,
+    g_mm: FloatArray,
+    v_mm: FloatArray,
+    splines: CurveSplines,
+    spacing_mm: float,
+    reach_mm: float,
 ) -> LocalSurface:
-    """Fit the local surface at every station.
+    """Fit the surface beside the rim.
 
     Parameters
     ----------
-    seen
-        (n,) scan points in the frames of the curve.
-    stations
-        (k,) evenly spaced arc lengths.
-    curve
-        The curve.
+    s_mm, g_mm, v_mm
+        (n,) arc length, depth behind the rim, and height of the scan points in the frames of the curve.
+    splines
+        Basis along the curve.
     spacing_mm
-        Point spacing of the scan; the windows scale with it.
+        Point spacing of the scan; the band scales with it.
     reach_mm
         Points further out of the surface than this are left out.
     """
-    band_mm = DEPTH_SPACINGS * spacing_mm
-    inside = (seen.inward_mm > -2.0 * spacing_mm) & (seen.inward_mm < band_mm) & (np.abs(seen.outward_mm) < reach_mm)
-    s, h, v = seen.s_mm[inside], seen.inward_mm[inside] / band_mm, seen.outward_mm[inside]
-    G = windows(s, stations, curve, WIDTH_SPACINGS * spacing_mm, powers=5)
-    trust = np.ones(len(s))
-    fit = np.full((len(stations), 6), np.nan)
-    noise, residual = 0.0, np.zeros(len(s))
-    for _ in range(ROUNDS):
-        powers = trust[:, None] * h[:, None] ** np.arange(5)
-        moments = np.stack([g @ powers for g in G])  # [p, k, q] = sum w d^p h^q
-        right = np.stack([g @ (powers[:, :3] * v[:, None]) for g in G[:3]])
-        A = moments[POWERS_D[:, None] + POWERS_D, :, POWERS_H[:, None] + POWERS_H].transpose(2, 0, 1)
-        b = right[POWERS_D, :, POWERS_H].T
-        enough = moments[0, :, 0] > LEAST_POINTS
-        # The ridge is far below the noise; it only keeps a window with all its points on one side solvable.
-        ridge = 1e-5 * moments[0, :, 0][:, None, None] * np.eye(6)
-        fit[enough] = np.linalg.solve((A + ridge)[enough], b[enough][..., None])[..., 0]
-        fit[~enough] = np.nan
-        near = interpolated(fit[:, :3], stations, s, curve)
-        residual = v - (near[:, 0] + near[:, 1] * h + near[:, 2] * h * h)
-        known = np.isfinite(residual)
-        noise = float(1.4826 * np.median(np.abs(residual[known]))) if known.any() else 0.0
-        trust = tukey(residual, max(4.7 * noise, 1e-6))
-    on_surface = np.zeros(len(seen.s_mm), dtype=bool)
-    on_surface[np.flatnonzero(inside)[np.abs(residual) < max(4.7 * noise, 1e-6)]] = True
-    return LocalSurface(fit[:, :3] / band_mm ** np.arange(3), on_surface, noise)
+    band_mm = band_depth_mm(spacing_mm)
+    inside = np.flatnonzero((g_mm > -OUTSIDE_SPACINGS * spacing_mm) & (g_mm < band_mm) & (np.abs(v_mm) < reach_mm))
+    v, g = v_mm[inside], g_mm[inside] / band_mm
+    rows = _rows(splines, s_mm[inside], g)
+    D = splines.second_differences()
+    rough = np.array(np.kron(np.eye(3), D.T @ D), dtype=np.float64)
+    free = 3 * len(D)
+    trust, noise_mm = np.ones(len(v)), max(float(np.std(v)) if len(v) else 0.0, LEAST_NOISE_MM)
+    stiffness = 1.0
+    for turn in range(ROUNDS):
+        weight = trust / noise_mm**2
+        N, right = rows.gram(weight) + RIDGE * np.eye(rows.size), rows.summed(weight * v)
+        if turn < ROUNDS - 1:
+            stiffness = most_likely(partial(_evidence, N, right, rough, free), start=stiffness if turn else None)
+        A = N + stiffness * rough
+        fit = np.asarray(cho_solve(cho_factor(A), right))
+        residual = v - rows.times(fit)
+        noise_mm = max(float(1.4826 * np.median(np.abs(residual))) if len(v) else 0.0, LEAST_NOISE_MM)
+        trust = tukey(residual, ROBUST * noise_mm)
+    half = weight * (np.arange(len(v)) % 2)
+    of_half = rows.gram(half) + 0.5 * RIDGE * np.eye(rows.size), rows.summed(half * v)
+    of_rest = N - of_half[0], right - of_half[1]
+    fits = [cho_solve(cho_factor(M + 0.5 * stiffness * rough), b)[: len(splines)] for M, b in (of_half, of_rest)]
+    on_surface = np.zeros(len(s_mm), dtype=bool)
+    on_surface[inside[np.abs(residual) < ROBUST * noise_mm]] = True
+    coefficients = fit.reshape(3, -1) / band_mm ** np.arange(3)[:, None]
+    halves_mm = float(np.sqrt(np.mean((fits[0] - fits[1]) ** 2)))
+    return LocalSurface(splines, coefficients, A, band_mm, on_surface, noise_mm, stiffness, halves_mm)
+
+
+def _rows(splines: CurveSplines, s_mm: FloatArray, g: FloatArray) -> LocalRows:
+    """Return the rows of the quadratic: coefficients of 1, then g, then g^2."""
+    near, K = splines.at(s_mm), len(splines)
+    columns = np.concatenate([near.columns + power * K for power in range(3)], axis=1)
+    values = np.concatenate([near.values * g[:, None] ** power for power in range(3)], axis=1)
+    return LocalRows(columns, values, 3 * K)
+
+
+def _evidence(N: FloatArray, right: FloatArray, rough: FloatArray, free: int, stiffness: float) -> float:
+    """Return the logarithm of the marginal likelihood of a stiffness, up to a constant."""
+    factor = cho_factor(N + stiffness * rough)
+    fit = cho_solve(factor, right)
+    return float(0.5 * right @ fit + 0.5 * free * np.log(stiffness) - np.log(np.diag(factor[0])).sum())

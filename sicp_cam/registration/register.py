@@ -9,9 +9,10 @@ import numpy as np
 from sicp_cam.contour.frames import FramedCurve, framed, moved
 from sicp_cam.contour.projection import nearest
 from sicp_cam.errors import RegistrationError
-from sicp_cam.findings import Finding, Level
 from sicp_cam.model import Contour, FloatArray, Scan
 from sicp_cam.registration.edge import EdgeMeasurement, measure, on_curve
+from sicp_cam.registration.noticed import noticed
+from sicp_cam.registration.projection import project
 from sicp_cam.registration.result import RegisteredContour, Registration, Residuals, Segment
 from sicp_cam.registration.rigid import NominalContour, RigidPose, facing_rim, register_rigidly
 from sicp_cam.registration.scan_surface import ScanSurface, cropped, prepared, without_copies
@@ -19,6 +20,7 @@ from sicp_cam.registration.segments import blended
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
 from sicp_cam.registration.sicp import Subdivided, paper_s_icp, s_icp
 from sicp_cam.registration.start import find_start, is_symmetric, side_ratio
+from sicp_cam.registration.uncut import is_uncut, register_to_surface
 from sicp_cam.rigid_motion import apply, is_rigid
 
 __all__ = ["register_contours"]
@@ -28,11 +30,6 @@ MOST_CROPS = 4
 RECROP_SHARE = 0.4
 """Move of the contour by the rigid pose, over the reach, above which the scan is cut out anew."""
 MIN_POINTS = 50
-SHOWN_SHARE = 0.9
-"""Coverage below which the operator is warned."""
-UNSURE_SIDE = 0.67
-"""Misfit of the pose over that of the part turned over above which the scan does not tell the side."""
-WEAK_FREEDOM = 0.05
 
 
 def register_contours(
@@ -54,7 +51,7 @@ def register_contours(
     T_start
         (4, 4) rough T_scan_part; None to find it from the geometry.
     method
-        `rigid`, `paper` or `sicp`.
+        `rigid`, `projection`, `paper` or `sicp`.
     settings
         Defaults where None.
 
@@ -75,20 +72,20 @@ def register_contours(
     side = None
     if symmetry is None:
         side = side_ratio(list(nominal.values()), surface, pose.T_scan_part, reach_mm=settings.reach_mm)
-    done = tuple(
+    done = [
         _registered_contour(number, contour, surface, pose, method, settings) for number, contour in nominal.items()
-    )
-    noise = float(np.mean([noise_mm for _, noise_mm in done]))
+    ]
+    registered = tuple(contour for contour, _ in done)
     return Registration(
         method,
         pose.T_scan_part,
-        tuple(contour for contour, _ in done),
+        registered,
         surface.spacing_mm,
-        noise,
+        float(np.mean([measured.noise_mm for _, measured in done])),
         pose.freedoms,
         symmetry,
         side,
-        _findings(pose, done) + _side_findings(side, scan.normals is not None),
+        noticed(scan, surface, pose, done, side),
     )
 
 
@@ -111,7 +108,8 @@ def _rigid(
     for _ in range(MOST_CROPS):
         near = [moved(contour.curve, T) for contour in contours]
         surface = prepared(_enough(cropped(scan, near, CROP_MARGIN * settings.reach_mm), settings))
-        pose = register_rigidly(contours, surface, T, reach_mm=settings.reach_mm)
+        solid = all(is_uncut(contour, surface, T, settings.reach_mm) for contour in contours)
+        pose = (register_to_surface if solid else register_rigidly)(contours, surface, T, reach_mm=settings.reach_mm)
         after = [moved(contour.curve, pose.T_scan_part) for contour in contours]
         shift = max(
             float(np.linalg.norm(a.points_mm - b.points_mm, axis=1).max()) for a, b in zip(near, after, strict=True)
@@ -139,23 +137,35 @@ def _registered_contour(
     pose: RigidPose,
     method: str,
     settings: RegistrationSettings,
-) -> tuple[RegisteredContour, float]:
+) -> tuple[RegisteredContour, EdgeMeasurement]:
     rigid = moved(contour.curve, pose.T_scan_part)
-    before = measure(rigid, surface, reach_mm=settings.reach_mm)
+    uncut = is_uncut(contour, surface, pose.T_scan_part, settings.reach_mm)
+    if uncut and method not in ("sicp", "rigid"):
+        raise RegistrationError(
+            f"contour {number} is not cut yet, and the method {method} needs its edge; use --method sicp or rigid"
+        )
+    offset_mm, reach_mm = settings.edge_offset_mm, settings.reach_mm
+    before = measure(rigid, surface, reach_mm=reach_mm, uncut=uncut, edge_offset_mm=offset_mm, rough=True)
     if not before.covered.any():
         raise RegistrationError(
-            f"the scan shows no edge anywhere along contour {number};"
+            f"the scan shows no {'surface' if uncut else 'edge'} anywhere along contour {number};"
             " check that scan and part belong together and the start pose (--align)"
         )
-    if method == "rigid":
-        segments: tuple[Segment, ...] = ()
-        corrected, splits = rigid, np.zeros(0)
-        stability = apply(pose.T_scan_part, contour.ring_points_mm)
-    else:
-        divided = (s_icp if method == "sicp" else paper_s_icp)(contour, surface, pose.T_scan_part, settings)
-        corrected, segments, splits = divided.curve, divided.segments, divided.subdivision.splits_mm
-        stability = _stability(contour, divided)
-    after = measure(corrected, surface, reach_mm=settings.reach_mm)
+    segments: tuple[Segment, ...] = ()
+    splits, after = np.zeros(0), before
+    corrected, stability = rigid, apply(pose.T_scan_part, contour.ring_points_mm)
+    if method == "projection":
+        corrected = project(contour, surface, pose.T_scan_part, settings)
+        after = measure(corrected, surface, reach_mm=settings.reach_mm)
+    elif method in ("sicp", "paper"):
+        T = pose.T_scan_part
+        if method == "sicp":
+            divided = s_icp(contour, surface, T, settings, before, uncut=uncut)
+        else:
+            divided = paper_s_icp(contour, surface, T, settings)
+        corrected, after, segments = divided.curve, divided.measured, divided.segments
+        splits, stability = divided.subdivision.splits_mm, _stability(contour, divided)
+    stated = method == "sicp" and settings.field
     chosen, _ = facing_rim(surface.rim, corrected, 3.0 * surface.spacing_mm)
     registered = RegisteredContour(
         number,
@@ -171,8 +181,12 @@ def _registered_contour(
         contour.ring_points_mm,
         stability,
         is_symmetric(contour.curve),
+        on_curve(after.normal_u_mm, after, corrected) if stated and not uncut else None,
+        on_curve(after.out_u_mm, after, corrected) if stated else None,
+        after.leave_out if stated and not uncut else None,
+        uncut,
     )
-    return registered, after.noise_mm
+    return registered, after
 
 
 def _stability(contour: NominalContour, divided: Subdivided) -> FloatArray:
@@ -188,46 +202,4 @@ def _stability(contour: NominalContour, divided: Subdivided) -> FloatArray:
 
 
 def _residuals(measured: EdgeMeasurement, curve: FramedCurve) -> Residuals:
-    normal = np.where(measured.edge_trusted, measured.depth_mm, np.nan)
-    out = np.where(measured.covered, measured.height_mm, np.nan)
-    return Residuals(on_curve(normal, measured, curve), on_curve(out, measured, curve))
-
-
-def _findings(pose: RigidPose, done: tuple[tuple[RegisteredContour, float], ...]) -> tuple[Finding, ...]:
-    found = []
-    for value, twist in zip(pose.freedoms, pose.twists, strict=True):
-        if value < WEAK_FREEDOM:
-            kind = "rotation" if np.linalg.norm(twist[:3]) > np.linalg.norm(twist[3:]) else "sliding"
-            axis = twist[:3] if kind == "rotation" else twist[3:]
-            axis = axis / np.linalg.norm(axis)
-            direction = ", ".join(f"{x:.2f}" for x in axis)
-            found.append(
-                Finding(
-                    401,
-                    Level.INFO,
-                    f"the contour hardly holds a {kind} about or along ({direction}) in the scan frame;"
-                    " the start pose decides it",
-                )
-            )
-    for contour, _ in done:
-        share = float(contour.covered.mean())
-        if share < 1.0:
-            found.append(
-                Finding(
-                    402,
-                    Level.INFO if share >= SHOWN_SHARE else Level.WARN,
-                    f"the scan shows {100.0 * share:.1f} % of the edge; the rest is carried over from both sides",
-                    f"contour {contour.number}",
-                )
-            )
-    return tuple(found)
-
-
-def _side_findings(side: float | None, has_normals: bool) -> tuple[Finding, ...]:
-    if side is None or side < UNSURE_SIDE or has_normals:
-        return ()
-    text = (
-        "the scan fits the part turned over about as well: the start pose alone says which side is outward;"
-        " check it, or scan with normals"
-    )
-    return (Finding(404, Level.INFO, text),)
+    return Residuals(on_curve(measured.depth_mm, measured, curve), on_curve(measured.height_mm, measured, curve))

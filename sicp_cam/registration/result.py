@@ -8,7 +8,7 @@ from sicp_cam.contour.frames import FramedCurve
 from sicp_cam.findings import Finding
 from sicp_cam.model import BoolArray, FloatArray
 
-__all__ = ["RegisteredContour", "Registration", "Residuals", "Segment"]
+__all__ = ["LeaveOut", "RegisteredContour", "Registration", "Residuals", "Segment"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +47,20 @@ class Segment:
     rms_mm: float
 
 
+@dataclass(frozen=True, slots=True)
+class LeaveOut:
+    """Root mean square difference of the contours found from the even and from the odd points of the scan, mm.
+
+    Parameters
+    ----------
+    normal_mm, out_mm
+        Along B and along N.
+    """
+
+    normal_mm: float
+    out_mm: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RegisteredContour:
     """A nominal contour and where the scan says that it is.
@@ -73,6 +87,13 @@ class RegisteredContour:
         (q, 3) stability points as designed and as registered.
     symmetric
         True if the nominal contour falls onto itself when it is turned or turned over.
+    normal_u_mm, out_u_mm
+        (k,) standard uncertainty of `corrected` along B and along N; None where the method states none, and along B
+        where the contour is not cut yet.
+    leave_out
+        How well half of the scan predicts the other half; None where the method does not look.
+    uncut
+        True where the scan goes on beyond the contour: in the surface it lies as the start pose has it.
     """
 
     number: int
@@ -88,6 +109,10 @@ class RegisteredContour:
     stability_part_mm: FloatArray
     stability_scan_mm: FloatArray
     symmetric: bool = False
+    normal_u_mm: FloatArray | None = None
+    out_u_mm: FloatArray | None = None
+    leave_out: LeaveOut | None = None
+    uncut: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +122,7 @@ class Registration:
     Parameters
     ----------
     method
-        `rigid`, `paper` or `sicp`.
+        `rigid`, `projection`, `paper` or `sicp`.
     T_scan_part
         (4, 4) the rigid pose, mm.
     contours

@@ -9,7 +9,7 @@ would never reach.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,15 +22,19 @@ from sicp_cam.registration.gauss_newton import Rows, freedoms, motion_step, stac
 from sicp_cam.registration.scan_surface import ScanSurface, distances_along_normal
 from sicp_cam.rigid_motion import apply, rotate
 
-__all__ = ["NominalContour", "RigidPose", "facing_rim", "register_rigidly"]
+__all__ = ["NominalContour", "RigidPose", "facing_rim", "register_rigidly", "thinned"]
 
 MAX_ITERATIONS = 60
-PRIOR = 1e-6
+CONVERGED_MM = 1e-3
+PRIOR = 1e-3
 RING_SHARE = 0.5
 """Weight of all stability points together over the weight of all rim points together."""
 FACING = 0.3
 """Least cosine between a rim point's open side and the contour's own open side."""
 MIN_RIM_POINTS = 20
+COARSE_POINTS = 300
+OUT_REACHES = 2.0
+"""Robust scale out of the surface, in reaches: a twisted part lies far out everywhere, not only where it is wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,10 +74,19 @@ def facing_rim(rim: Rim, curve: FramedCurve, reach_mm: float) -> tuple[IntArray,
     indices, s_mm
         (m,) indices into the rim, and the arc length of the nearest place on the curve.
     """
-    s_mm, distance = nearest(rim.points_mm, curve)
+    s_mm, distance = nearest(rim.points_mm, curve, reach_mm=reach_mm)
     facing = -np.sum(rim.open_directions * at(curve, s_mm).inward, axis=1)
     chosen = np.flatnonzero((distance <= reach_mm) & (facing >= FACING))
     return chosen, s_mm[chosen]
+
+
+def thinned(contours: Sequence[NominalContour], surface: ScanSurface) -> tuple[list[NominalContour], ScanSurface]:
+    """Return contours and scan with few enough rim and stability points for a pose that need not be exact yet."""
+    rim, rings = surface.rim, max(len(contour.ring_points_mm) for contour in contours)
+    step, ring_step = max(1, len(rim.indices) // COARSE_POINTS), max(1, rings // COARSE_POINTS)
+    few = Rim(rim.indices[::step], rim.points_mm[::step], rim.open_directions[::step])
+    coarse = [NominalContour(c.curve, c.ring_points_mm[::ring_step], c.ring_normals[::ring_step]) for c in contours]
+    return coarse, replace(surface, rim=few)
 
 
 def register_rigidly(
@@ -104,22 +117,34 @@ def register_rigidly(
     RegistrationError
         If fewer than 50 rim points lie near the contours.
     """
-    T = T_start
-    scale_mm = reach_mm
+    T, scale_mm = _descended(*thinned(contours, surface), T_start, reach_mm, reach_mm, iterations)
+    T, scale_mm = _descended(contours, surface, T, reach_mm, scale_mm, iterations)
+    rows, _ = _equations(contours, surface, T, reach_mm, scale_mm)
+    used = rows.weights > 0.0
+    rms = float(np.sqrt(np.average(rows.residuals_mm[used] ** 2, weights=rows.weights[used])))
+    values, twists = freedoms(rows)
+    return RigidPose(T, values, twists, rms)
+
+
+def _descended(
+    contours: Sequence[NominalContour],
+    surface: ScanSurface,
+    T: FloatArray,
+    reach_mm: float,
+    scale_mm: float,
+    iterations: int,
+) -> tuple[FloatArray, float]:
+    """Return the pose after Gauss-Newton from a start, and the robust scale that it came down to."""
     for _ in range(iterations):
         rows, inward_mm = _equations(contours, surface, T, reach_mm, scale_mm)
         step = motion_step(rows, PRIOR)
         T = step @ T
         floor_mm = max(3.0 * surface.spacing_mm, 3.0 * _robust_deviation(inward_mm))
         moved_mm = np.abs(apply(step, rows.points_mm[::50]) - rows.points_mm[::50]).max()
-        if moved_mm < 1e-4 and scale_mm <= floor_mm:
+        if moved_mm < CONVERGED_MM and scale_mm <= floor_mm:
             break
         scale_mm = max(0.5 * scale_mm, floor_mm)
-    rows, inward_mm = _equations(contours, surface, T, reach_mm, scale_mm)
-    used = rows.weights > 0.0
-    rms = float(np.sqrt(np.average(rows.residuals_mm[used] ** 2, weights=rows.weights[used])))
-    values, twists = freedoms(rows)
-    return RigidPose(T, values, twists, rms)
+    return T, scale_mm
 
 
 def _equations(
@@ -152,7 +177,7 @@ def _rim_rows(points_mm: FloatArray, foot: FramedCurve, scale_mm: float, reach_m
     offset = points_mm - foot.points_mm
     inward, outward = np.sum(offset * foot.inward, axis=1), np.sum(offset * foot.outward, axis=1)
     # In the surface the rim is sharp and its outliers are many; out of it the deformation itself is large.
-    trust = tukey(inward, scale_mm) * tukey(outward, max(scale_mm, 0.75 * reach_mm)) / len(points_mm)
+    trust = tukey(inward, scale_mm) * tukey(outward, OUT_REACHES * reach_mm) / len(points_mm)
     return [
         Rows(foot.points_mm, foot.inward, inward, trust),
         Rows(foot.points_mm, foot.outward, outward, trust),
@@ -162,7 +187,7 @@ def _rim_rows(points_mm: FloatArray, foot: FramedCurve, scale_mm: float, reach_m
 def _ring_rows(contour: NominalContour, surface: ScanSurface, T: FloatArray, reach_mm: float) -> Rows:
     points, normals = apply(T, contour.ring_points_mm), rotate(T, contour.ring_normals)
     distances, planes = distances_along_normal(surface, points, normals, reach_mm)
-    trust = RING_SHARE * tukey(distances, 0.75 * reach_mm) / len(points)
+    trust = RING_SHARE * tukey(distances, OUT_REACHES * reach_mm) / len(points)
     return Rows(points, planes, np.nan_to_num(distances), trust)
 
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sicp_cam.contour.boundary import Rim, cloud_rim, mesh_rim, surface_normals
+from sicp_cam.contour.boundary import LocalPlanes, Rim, cloud_rim, local_planes, mesh_rim, without
 from sicp_cam.contour.frames import FramedCurve
-from sicp_cam.model import FloatArray, IntArray, Scan
+from sicp_cam.model import BoolArray, FloatArray, IntArray, Scan
+from sicp_cam.registration.evenness import evened
 
 __all__ = ["ScanSurface", "cropped", "distances_along_normal", "prepared", "without_copies"]
 
-PLANE_NEIGHBOURS = 12
+NEAR = 4
+APART = 1.8
+"""How much further than those of its neighbours the 4th neighbour of a stray point is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,9 +27,11 @@ class ScanSurface:
     Parameters
     ----------
     points_mm
-        (n, 3) points in the scan frame.
+        (n, 3) points in the scan frame, without strays.
     tree
         Their k-d tree.
+    planes
+        The plane of each point and its neighbours.
     rim
         The points at which the scan ends.
     spacing_mm
@@ -35,21 +40,45 @@ class ScanSurface:
         (n, 3) outward normals where the scan file gives them.
     faces
         (m, 3) triangles of a mesh; None for a cloud.
+    strays_mm
+        (q, 3) points that lie apart from all others, as where a beam meets the edge of a part and what is behind it.
+    in_rows
+        True if the points lay in rows, much denser along them than across, and were thinned to an even spacing.
     """
 
     points_mm: FloatArray
     tree: cKDTree
+    planes: LocalPlanes
     rim: Rim
     spacing_mm: float
     normals: FloatArray | None = None
     faces: IntArray | None = None
+    strays_mm: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    in_rows: bool = False
 
 
 def prepared(scan: Scan) -> ScanSurface:
-    """Return a scan without copies of points, see `without_copies`, with its k-d tree, spacing and rim."""
+    """Return a scan without copies of points, see `without_copies`, with its k-d tree, planes, spacing and rim."""
+    before, scan = len(scan.points_mm), evened(scan)
     tree = cKDTree(scan.points_mm)
-    rim = cloud_rim(scan.points_mm, tree) if scan.faces is None else mesh_rim(scan.points_mm, scan.faces)
-    return ScanSurface(scan.points_mm, tree, rim, _spacing_mm(scan.points_mm, tree), scan.normals, scan.faces)
+    planes = local_planes(scan.points_mm, tree)
+    if scan.faces is not None:
+        rim = mesh_rim(scan.points_mm, scan.faces)
+        return ScanSurface(scan.points_mm, tree, planes, rim, _spacing_mm(planes), scan.normals, scan.faces)
+    apart = _apart(planes)
+    points, normals = scan.points_mm[~apart], None if scan.normals is None else scan.normals[~apart]
+    if apart.any():
+        tree = cKDTree(points)
+        planes = without(planes, points, tree, apart)
+    rim = cloud_rim(points, planes)
+    strays, in_rows = scan.points_mm[apart], before > len(scan.points_mm)
+    return ScanSurface(points, tree, planes, rim, _spacing_mm(planes), normals, None, strays, in_rows)
+
+
+def _apart(planes: LocalPlanes) -> BoolArray:
+    """Say which points lie further from their neighbours than those do from theirs (after Breunig et al. 2000)."""
+    own = planes.distances_mm[:, min(NEAR, planes.distances_mm.shape[1] - 1)]
+    return np.asarray(own > APART * np.median(own[planes.neighbours[:, 1 : 2 * NEAR + 1]], axis=1))
 
 
 def without_copies(scan: Scan) -> Scan:
@@ -63,11 +92,9 @@ def without_copies(scan: Scan) -> Scan:
     return Scan(scan.points_mm[first], None if scan.normals is None else scan.normals[first], None, scan.source)
 
 
-def _spacing_mm(points_mm: FloatArray, tree: cKDTree) -> float:
+def _spacing_mm(planes: LocalPlanes) -> float:
     """Return the spacing from the distance r of the 4th neighbour, pi r^2 holding four points: r sqrt(pi / 4)."""
-    some = points_mm[:: max(1, len(points_mm) // 5000)]
-    distance, _ = tree.query(some, k=5)
-    return float(np.median(distance[:, 4]) * np.sqrt(np.pi / 4.0))
+    return float(np.median(planes.distances_mm[:, min(NEAR, planes.distances_mm.shape[1] - 1)]) * np.sqrt(np.pi / NEAR))
 
 
 def cropped(scan: Scan, curves: Sequence[FramedCurve], reach_mm: float) -> Scan:
@@ -110,16 +137,14 @@ def distances_along_normal(
         (q,) signed distance from each point to the scan's plane, positive outward, NaN where the scan has no surface
         there or its normal is more than 45 degrees off; (q, 3) unit normal of that plane, on the outward side.
     """
-    wanted = min(PLANE_NEIGHBOURS, len(surface.points_mm))
-    distance, index = surface.tree.query(points_mm, k=wanted, distance_upper_bound=2.0 * reach_mm)
-    found = np.isfinite(distance).all(axis=1)
-    index = np.where(found[:, None], index, 0)
-    N, centres = surface_normals(surface.points_mm[index])
+    distance, index = surface.tree.query(points_mm, distance_upper_bound=reach_mm)
+    found = np.isfinite(distance)
+    index = np.where(found, index, 0)
+    N, centres = surface.planes.normals[index], surface.planes.centres_mm[index]
     agreement = np.sum(N * normals, axis=1)
-    N = N * np.sign(agreement)[:, None]
+    N = N * np.where(agreement < 0.0, -1.0, 1.0)[:, None]
     out = np.sum((centres - points_mm) * N, axis=1)
     # The plane must lie beside the point, not end before it: its centre may be off in the plane by its own radius.
-    radius = np.max(np.linalg.norm(surface.points_mm[index] - centres[:, None], axis=2), axis=1)
     sideways = np.linalg.norm(centres - points_mm - out[:, None] * N, axis=1)
-    usable = found & (distance[:, 0] <= reach_mm) & (np.abs(agreement) > np.sqrt(0.5)) & (sideways <= radius)
+    usable = found & (np.abs(agreement) > np.sqrt(0.5)) & (sideways <= surface.planes.radii_mm[index])
     return np.where(usable, out, np.nan), N

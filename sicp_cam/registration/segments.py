@@ -8,7 +8,7 @@ primary pose settles the rest (sliding along the contour).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -17,15 +17,16 @@ from sicp_cam.contour.frames import FramedCurve, at, moved, orthonormal
 from sicp_cam.contour.projection import nearest
 from sicp_cam.contour.subdivision import Subdivision, weights
 from sicp_cam.model import FloatArray, IntArray
-from sicp_cam.registration.gauss_newton import Rows, motion_step, stacked, tukey
+from sicp_cam.registration.gauss_newton import Rows, motion_steps, stacked, tukey
 from sicp_cam.registration.result import Segment
 from sicp_cam.registration.rigid import NominalContour
 from sicp_cam.registration.scan_surface import ScanSurface, distances_along_normal
-from sicp_cam.rigid_motion import apply, inverse, rotate
+from sicp_cam.rigid_motion import apply, rotate
 
 __all__ = ["Targets", "blended", "point_to_curve", "point_to_point", "register_segments"]
 
 ITERATIONS = 12
+CONVERGED_MM = 1e-4
 PRIOR = 1e-4
 RING_SHARE = 0.25
 SLIDE_SHARE = 0.003
@@ -42,14 +43,13 @@ class Targets:
         (k,) arc lengths of the stations.
     points_scan_mm
         (k, 3) targets in the scan frame.
-    edge_weights, surface_weights
-        (k,) trust in each, in the surface across the contour and out of it; 0 where the scan shows nothing.
+    weights
+        (k,) trust in each; 0 where the scan shows nothing.
     """
 
     s_mm: FloatArray
     points_scan_mm: FloatArray
-    edge_weights: FloatArray
-    surface_weights: FloatArray
+    weights: FloatArray
 
 
 Correspondence: TypeAlias = Callable[[FramedCurve, IntArray], Rows]
@@ -63,10 +63,8 @@ def point_to_curve(targets: Targets) -> Correspondence:
         offset = targets.points_scan_mm[stations] - now.points_mm
         across = np.sum(offset * now.inward, axis=1)
         out = np.sum(offset * now.outward, axis=1)
-        return stacked(
-            Rows(now.points_mm, now.inward, across, targets.edge_weights[stations]),
-            Rows(now.points_mm, now.outward, out, targets.surface_weights[stations]),
-        )
+        trust = targets.weights[stations]
+        return stacked(Rows(now.points_mm, now.inward, across, trust), Rows(now.points_mm, now.outward, out, trust))
 
     return rows
 
@@ -124,57 +122,67 @@ def register_segments(
     reach_mm
         Largest distance between a stability point and the scan.
     """
-    stations = at(contour.curve, s_mm)
-    ring_s, _ = nearest(contour.ring_points_mm, contour.curve) if len(contour.ring_points_mm) else (np.zeros(0), None)
-    at_stations, at_ring = weights(subdivision, s_mm), weights(subdivision, ring_s)
-    segments = []
-    for piece, (start_mm, end_mm) in enumerate(subdivision.ranges_mm()):
-        chosen = np.flatnonzero(at_stations[:, piece] > 0.0)
-        ring = np.flatnonzero(at_ring[:, piece] > 0.0)
-        T, rms = _register_piece(
-            contour, _taken(stations, chosen), chosen, ring, correspondence, surface, T_primary, reach_mm
-        )
-        segments.append(Segment(float(start_mm), float(end_mm), T, rms))
-    return tuple(segments)
-
-
-def _register_piece(
-    contour: NominalContour,
-    nominal: FramedCurve,
-    stations: IntArray,
-    ring: IntArray,
-    correspondence: Correspondence,
-    surface: ScanSurface,
-    T_primary: FloatArray,
-    reach_mm: float,
-) -> tuple[FloatArray, float]:
-    T = T_primary
-    rms = 0.0
+    T = np.tile(T_primary, (len(subdivision.ranges_mm()), 1, 1))
+    stations, station_piece = _pairs(subdivision, s_mm)
+    nominal = at(contour.curve, s_mm[stations])
+    ring_s = nearest(contour.ring_points_mm, contour.curve)[0] if len(contour.ring_points_mm) else np.zeros(0)
+    ring, ring_piece = _pairs(subdivision, ring_s)
+    ring_points, ring_normals = contour.ring_points_mm[ring], contour.ring_normals[ring]
+    ring_count = np.bincount(ring_piece, minlength=len(T))
+    primary = moved(nominal, T_primary)
     for _ in range(ITERATIONS):
-        edge = correspondence(moved(nominal, T), stations)
-        total = edge.weights.sum()
-        parts = [Rows(edge.points_mm, edge.directions, edge.residuals_mm, edge.weights / max(total, 1e-12))]
-        parts.append(_against_sliding(moved(nominal, T), moved(nominal, T_primary)))
+        now = _moved_each(nominal, T[station_piece])
+        edge = correspondence(now, stations)
+        edge_piece = np.tile(station_piece, len(edge.weights) // len(stations))
+        total = np.bincount(edge_piece, weights=edge.weights, minlength=len(T))
+        edge = replace(edge, weights=edge.weights / np.maximum(total, 1e-12)[edge_piece])
+        parts, piece = [edge, _against_sliding(now, primary, station_piece)], [edge_piece, station_piece]
         if len(ring):
-            points, normals = apply(T, contour.ring_points_mm[ring]), rotate(T, contour.ring_normals[ring])
+            points, normals = _points_each(T[ring_piece], ring_points), _directions_each(T[ring_piece], ring_normals)
             distances, planes = distances_along_normal(surface, points, normals, reach_mm)
-            trust = RING_SHARE * tukey(distances, 0.75 * reach_mm) / len(ring)
+            trust = RING_SHARE * tukey(distances, 0.75 * reach_mm) / ring_count[ring_piece]
             parts.append(Rows(points, planes, np.nan_to_num(distances), trust))
-        rows = stacked(*parts)
-        if total <= 0.0:
-            return T_primary, 0.0  # nothing of this piece was scanned: it keeps the primary pose
-        step = motion_step(rows, PRIOR, T_primary @ inverse(T))
-        T = step @ T
-        rms = float(np.sqrt(np.average(rows.residuals_mm**2, weights=rows.weights)))
-        if np.abs(apply(step, rows.points_mm[:1]) - rows.points_mm[:1]).max() < 1e-4:
+            piece.append(ring_piece)
+        rows, group = stacked(*parts), np.concatenate(piece)
+        # A piece of which nothing was scanned keeps the primary pose.
+        rows = replace(rows, weights=rows.weights * (total > 0.0)[group])
+        steps = motion_steps(rows, group, PRIOR, T_primary @ np.linalg.inv(T))
+        T = steps @ T
+        if np.abs(_points_each(steps[station_piece], now.points_mm) - now.points_mm).max() < CONVERGED_MM:
             break
-    return T, rms
+    weight = np.maximum(np.bincount(group, weights=rows.weights, minlength=len(T)), 1e-300)
+    rms = np.sqrt(np.bincount(group, weights=rows.weights * rows.residuals_mm**2, minlength=len(T)) / weight)
+    return tuple(
+        Segment(float(start), float(end), motion, float(residual))
+        for (start, end), motion, residual in zip(subdivision.ranges_mm(), T, rms, strict=True)
+    )
 
 
-def _against_sliding(now: FramedCurve, primary: FramedCurve) -> Rows:
+def _pairs(subdivision: Subdivision, s_mm: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return which arc lengths belong to which piece, as (n,) indices of each; some belong to two."""
+    pairs = np.nonzero(weights(subdivision, s_mm) > 0.0)
+    return pairs[0], pairs[1]
+
+
+def _points_each(T: FloatArray, points_mm: FloatArray) -> FloatArray:
+    """Move each of (n, 3) points by its own of (n, 4, 4) motions."""
+    return _directions_each(T, points_mm) + T[:, :3, 3]
+
+
+def _directions_each(T: FloatArray, directions: FloatArray) -> FloatArray:
+    return np.asarray(np.einsum("nij,nj->ni", T[:, :3, :3], directions))
+
+
+def _moved_each(curve: FramedCurve, T: FloatArray) -> FramedCurve:
+    """Return stations moved each by its own of (k, 4, 4) motions."""
+    T_axis, B, N = (_directions_each(T, axis) for axis in (curve.tangents, curve.inward, curve.outward))
+    return replace(curve, points_mm=_points_each(T, curve.points_mm), tangents=T_axis, inward=B, outward=N)
+
+
+def _against_sliding(now: FramedCurve, primary: FramedCurve, piece: IntArray) -> Rows:
     """Return equations that keep stations where the primary pose has them along the contour, and only along it."""
     back = np.sum((primary.points_mm - now.points_mm) * now.tangents, axis=1)
-    return Rows(now.points_mm, now.tangents, back, np.full(len(back), SLIDE_SHARE / len(back)))
+    return Rows(now.points_mm, now.tangents, back, SLIDE_SHARE / np.bincount(piece)[piece])
 
 
 def blended(curve: FramedCurve, subdivision: Subdivision, segments: tuple[Segment, ...]) -> FramedCurve:
@@ -193,15 +201,3 @@ def blended(curve: FramedCurve, subdivision: Subdivision, segments: tuple[Segmen
         outward[some] += share * rotate(T, curve.outward[some])
     T_axis, B, N = orthonormal(tangents, outward)
     return FramedCurve(curve.s_mm, points, T_axis, B, N, curve.length_mm, curve.closed)
-
-
-def _taken(curve: FramedCurve, rows: IntArray) -> FramedCurve:
-    return FramedCurve(
-        curve.s_mm[rows],
-        curve.points_mm[rows],
-        curve.tangents[rows],
-        curve.inward[rows],
-        curve.outward[rows],
-        curve.length_mm,
-        curve.closed,
-    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,40 +11,54 @@ from sicp_cam.contour.frames import FramedCurve, at, moved
 from sicp_cam.contour.subdivision import Subdivision, bends, subdivide
 from sicp_cam.errors import RegistrationError
 from sicp_cam.model import FloatArray
-from sicp_cam.registration.axes import tilted
-from sicp_cam.registration.edge import EdgeMeasurement, gaps, measure
+from sicp_cam.registration.axes import displaced, tilted
+from sicp_cam.registration.edge import EdgeMeasurement, gaps, measure, on_curve
 from sicp_cam.registration.result import Segment
 from sicp_cam.registration.rigid import NominalContour, facing_rim
 from sicp_cam.registration.scan_surface import ScanSurface
 from sicp_cam.registration.segments import Targets, blended, point_to_curve, point_to_point, register_segments
 from sicp_cam.registration.settings import RegistrationSettings
+from sicp_cam.rigid_motion import best_fit
 
 __all__ = ["Subdivided", "paper_s_icp", "s_icp"]
 
-LADDER = (6, 8, 12, 16, 24, 32, 48, 64, 96)
+LADDER = (6, 12, 24, 48, 96)
 LEAST_PIECE_SPACINGS = 6.0
 GOOD_ENOUGH = 0.15
 """Mean distance out of the surface, over the scan's noise, below which no finer division is tried."""
-ROUNDS = 2
 PAPER_PIECES = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subdivided:
-    """A contour registered piece by piece, in the scan frame."""
+    """A contour registered piece by piece, in the scan frame, and what the scan shows from there."""
 
+    curve: FramedCurve
+    subdivision: Subdivision
+    segments: tuple[Segment, ...]
+    measured: EdgeMeasurement
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pieces:
     curve: FramedCurve
     subdivision: Subdivision
     segments: tuple[Segment, ...]
 
 
 def s_icp(
-    contour: NominalContour, surface: ScanSurface, T_primary: FloatArray, settings: RegistrationSettings
+    contour: NominalContour,
+    surface: ScanSurface,
+    T_primary: FloatArray,
+    settings: RegistrationSettings,
+    before: EdgeMeasurement,
+    *,
+    uncut: bool = False,
 ) -> Subdivided:
-    """Register a contour piece by piece to the measured edge and surface of the scan.
+    """Register a contour piece by piece to the measured edge and surface of the scan, and add the displacement field.
 
     The number of pieces is the least of a ladder that brings the contour onto the surface within a fraction of the
-    scan's noise. The scan is then measured anew from the result, and the pieces registered again.
+    scan's noise. The scan is then measured anew from the result; what it still shows as a smooth displacement is added.
 
     Parameters
     ----------
@@ -56,28 +70,25 @@ def s_icp(
         (4, 4) primary registration.
     settings
         Number of pieces, overlap, and the rest.
+    before
+        The scan measured from the primary registration.
+    uncut
+        True where the scan goes on beyond the contour, so that only its surface counts.
     """
-    measured = measure(moved(contour.curve, T_primary), surface, reach_mm=settings.reach_mm)
-    targets = _targets(moved(contour.curve, T_primary), measured)
-    sharp = bends(contour.curve, settings.corner_radius_mm)
-    found: Subdivided | None = None
-    least = np.inf
-    hidden = gaps(measured, contour.curve, measured.edge_trusted)
-    for pieces in _ladder(contour.curve, surface.spacing_mm, settings):
-        parts = subdivide(contour.curve, pieces, settings.overlap, sharp, hidden)
-        tried = _registered(contour, parts, targets, surface, T_primary, settings)
-        misfit = _mean_out(tried.curve, targets)
-        if found is None or misfit < least:
-            found, least = tried, misfit
-        if misfit <= GOOD_ENOUGH * measured.noise_mm:
-            break
-    if found is None:
-        raise RegistrationError("the contour is too short to be divided; use --method rigid")
-    for _ in range(ROUNDS):
-        targets = _targets(found.curve, measure(found.curve, surface, reach_mm=settings.reach_mm))
-        found = _registered(contour, found.subdivision, targets, surface, T_primary, settings)
-    final = measure(found.curve, surface, reach_mm=settings.reach_mm)
-    return Subdivided(tilted(found.curve, final), found.subdivision, found.segments)
+    found = _divided(contour, surface, T_primary, settings, before)
+    rigid = moved(contour.curve, T_primary)
+    rigid = rigid if uncut else _refitted(rigid, found.curve, before)
+    shown = measure(
+        found.curve,
+        surface,
+        reach_mm=settings.reach_mm,
+        rigid=rigid,
+        uncut=uncut,
+        edge_offset_mm=settings.edge_offset_mm,
+    )
+    curve = _on_surface(found.curve, rigid, shown, settings.field)
+    left = _after_field(shown, found.curve) if settings.field else shown
+    return Subdivided(curve, found.subdivision, found.segments, left)
 
 
 def paper_s_icp(
@@ -99,7 +110,61 @@ def paper_s_icp(
     segments = register_segments(contour, parts, s_mm, correspondence, surface, T_primary, reach_mm=settings.reach_mm)
     curve = blended(contour.curve, parts, segments)
     final = measure(curve, surface, reach_mm=settings.reach_mm)
-    return Subdivided(tilted(curve, final), parts, segments)
+    return Subdivided(tilted(curve, final), parts, segments, final)
+
+
+def _divided(
+    contour: NominalContour,
+    surface: ScanSurface,
+    T_primary: FloatArray,
+    settings: RegistrationSettings,
+    measured: EdgeMeasurement,
+) -> _Pieces:
+    """Return the contour in the least number of pieces that meets the measured edge and surface."""
+    targets = _targets(moved(contour.curve, T_primary), measured)
+    sharp, hidden = bends(contour.curve, settings.corner_radius_mm), gaps(measured, contour.curve)
+    found: _Pieces | None = None
+    least = np.inf
+    for pieces in _ladder(contour.curve, surface.spacing_mm, settings):
+        parts = subdivide(contour.curve, pieces, settings.overlap, sharp, hidden)
+        tried = _registered(contour, parts, targets, surface, T_primary, settings)
+        misfit = _mean_out(tried.curve, targets)
+        if found is None or misfit < least:
+            found, least = tried, misfit
+        if misfit <= GOOD_ENOUGH * measured.noise_mm:
+            break
+    if found is None:
+        raise RegistrationError("the contour is too short to be divided; use --method rigid")
+    return found
+
+
+def _on_surface(curve: FramedCurve, rigid: FramedCurve, measured: EdgeMeasurement, field: bool) -> FramedCurve:
+    """Return the curve with its frames on the scan's surface, and moved by the displacement field if wanted."""
+    slope, lift = (on_curve(values, measured, curve)[:, None] for values in (measured.slope, measured.lift_mm))
+    move = on_curve(measured.shift_mm, measured, curve) + lift * curve.outward
+    return displaced(rigid, curve.points_mm + field * move, curve.inward + slope * curve.outward)
+
+
+def _refitted(rigid: FramedCurve, curve: FramedCurve, measured: EdgeMeasurement) -> FramedCurve:
+    """Return the rigid contour moved as a whole onto the curve where the scan shows it.
+
+    What is smooth is the bending; the primary pose of a contour that is half seen adds a turn of its own.
+    """
+    shown = on_curve(measured.covered.astype(np.float64), measured, rigid)
+    return moved(rigid, best_fit(rigid.points_mm, curve.points_mm, np.maximum(shown, 1e-6)))
+
+
+def _after_field(measured: EdgeMeasurement, curve: FramedCurve) -> EdgeMeasurement:
+    """Return what the scan shows from the curve that the field has moved: the local part of what it showed before."""
+    inward = np.sum(measured.shift_mm * at(curve, measured.s_mm).inward, axis=1)
+    return replace(
+        measured,
+        depth_mm=measured.depth_mm - inward,
+        height_mm=measured.height_mm - measured.lift_mm,
+        shift_mm=np.zeros_like(measured.shift_mm),
+        lift_mm=np.zeros_like(measured.lift_mm),
+        slope=np.zeros_like(measured.slope),
+    )
 
 
 def _ladder(curve: FramedCurve, spacing_mm: float, settings: RegistrationSettings) -> tuple[int, ...]:
@@ -111,10 +176,8 @@ def _ladder(curve: FramedCurve, spacing_mm: float, settings: RegistrationSetting
 
 def _targets(curve: FramedCurve, measured: EdgeMeasurement) -> Targets:
     foot = at(curve, measured.s_mm)
-    depth, height = np.nan_to_num(measured.depth_mm)[:, None], np.nan_to_num(measured.height_mm)[:, None]
-    points = foot.points_mm + depth * foot.inward + height * foot.outward
-    trusted, covered = measured.edge_trusted.astype(np.float64), measured.covered.astype(np.float64)
-    return Targets(measured.s_mm, points, trusted, covered)
+    points = foot.points_mm + measured.shift_mm + measured.lift_mm[:, None] * foot.outward
+    return Targets(measured.s_mm, points, measured.covered.astype(np.float64))
 
 
 def _registered(
@@ -124,15 +187,15 @@ def _registered(
     surface: ScanSurface,
     T_primary: FloatArray,
     settings: RegistrationSettings,
-) -> Subdivided:
+) -> _Pieces:
     segments = register_segments(
         contour, subdivision, targets.s_mm, point_to_curve(targets), surface, T_primary, reach_mm=settings.reach_mm
     )
-    return Subdivided(blended(contour.curve, subdivision, segments), subdivision, segments)
+    return _Pieces(blended(contour.curve, subdivision, segments), subdivision, segments)
 
 
 def _mean_out(curve: FramedCurve, targets: Targets) -> float:
     """Return the mean distance of the targets from the curve, out of the surface."""
     foot = at(curve, targets.s_mm)
     out = np.sum((targets.points_scan_mm - foot.points_mm) * foot.outward, axis=1)
-    return float(np.average(np.abs(out), weights=targets.surface_weights)) if targets.surface_weights.any() else np.inf
+    return float(np.average(np.abs(out), weights=targets.weights)) if targets.weights.any() else np.inf

@@ -19,7 +19,7 @@ from sicp_cam.contour.loops import mesh_loops, resampled, rim_loops
 from sicp_cam.contour.projection import nearest
 from sicp_cam.errors import AmbiguousPoseError, RegistrationError
 from sicp_cam.model import FloatArray
-from sicp_cam.registration.rigid import NominalContour, register_rigidly
+from sicp_cam.registration.rigid import NominalContour, register_rigidly, thinned
 from sicp_cam.registration.scan_surface import ScanSurface, distances_along_normal
 from sicp_cam.rigid_motion import apply, best_fit, from_parts, rotate
 
@@ -165,7 +165,7 @@ def _refined(
     reach_mm: float,
 ) -> tuple[float, FloatArray] | None:
     try:
-        pose = register_rigidly(contours, surface, T, reach_mm=reach_mm, iterations=REFINING_STEPS)
+        pose = register_rigidly(*thinned(contours, surface), T, reach_mm=reach_mm, iterations=REFINING_STEPS)
     except RegistrationError:
         return None
     if _outward_agreement(contours, surface, pose.T_scan_part) < 0.0:

@@ -1,17 +1,14 @@
-"""Evenly spaced stations along a curve, and the Gaussian windows in arc length around them."""
+"""Evenly spaced stations along a curve; sums over the points around them, and values between them."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
+from scipy.ndimage import gaussian_filter1d
 
 from sicp_cam.contour.frames import FramedCurve
-from sicp_cam.model import FloatArray
+from sicp_cam.model import FloatArray, IntArray
 
-__all__ = ["even_stations", "interpolated", "windows"]
-
-CUT = 3.0
-"""Windows end at this many standard deviations."""
+__all__ = ["even_stations", "interpolated", "nearest_station", "smoothed", "sums"]
 
 
 def even_stations(curve: FramedCurve, spacing_mm: float) -> FloatArray:
@@ -20,42 +17,31 @@ def even_stations(curve: FramedCurve, spacing_mm: float) -> FloatArray:
     return np.linspace(0.0, curve.length_mm, count, endpoint=not curve.closed)
 
 
-def windows(
-    s_mm: FloatArray, stations: FloatArray, curve: FramedCurve, width_mm: float, powers: int = 1
-) -> list[sparse.csr_array]:
-    """Return the Gaussian weights of points at stations, times powers of their distance along the curve.
+def nearest_station(s_mm: FloatArray, stations: FloatArray, curve: FramedCurve) -> IntArray:
+    """Return the index of the station nearest to each of (n,) arc lengths."""
+    index = np.round(s_mm / (stations[1] - stations[0])).astype(np.int64)
+    return np.asarray(np.mod(index, len(stations)) if curve.closed else np.clip(index, 0, len(stations) - 1))
+
+
+def sums(s_mm: FloatArray, stations: FloatArray, curve: FramedCurve, values: FloatArray | None = None) -> FloatArray:
+    """Return the number of points nearest to each station, or the sum of their values, (k,)."""
+    index = nearest_station(s_mm, stations, curve)
+    return np.bincount(index, weights=values, minlength=len(stations)).astype(np.float64)
+
+
+def smoothed(values: FloatArray, stations: FloatArray, curve: FramedCurve, width_mm: float) -> FloatArray:
+    """Average values of the stations under a Gaussian window along the curve; zeros lie beyond open ends.
 
     Parameters
     ----------
-    s_mm
-        (n,) arc lengths of the points.
-    stations
-        (k,) evenly spaced arc lengths.
-    curve
-        Tells whether the arc length is periodic.
+    values
+        (k,) or (k, c).
     width_mm
         Standard deviation of the window.
-    powers
-        Number of matrices wanted.
-
-    Returns
-    -------
-    list of (k, n) sparse arrays; number p holds exp(-d^2 / 2) d^p, d being the distance in widths.
     """
-    k = len(stations)
-    step = stations[1] - stations[0]
-    half = int(np.ceil(CUT * width_mm / step))
-    column = np.round(s_mm / step).astype(np.int64)[:, None] + np.arange(-half, half + 1)
-    d = (s_mm[:, None] - column * step) / width_mm
-    inside = np.abs(d) <= CUT
-    if curve.closed:
-        column %= k
-    else:
-        inside &= (column >= 0) & (column < k)
-    point = np.broadcast_to(np.arange(len(s_mm))[:, None], column.shape)[inside]
-    row, d = column[inside], d[inside]
-    weight = np.exp(-0.5 * d * d)
-    return [sparse.csr_array((weight * d**p, (row, point)), shape=(k, len(s_mm))) for p in range(powers)]
+    width = width_mm / (stations[1] - stations[0])
+    mode = "wrap" if curve.closed else "constant"
+    return np.asarray(gaussian_filter1d(values, width, axis=0, mode=mode, truncate=3.0))
 
 
 def interpolated(values: FloatArray, stations: FloatArray, s_mm: FloatArray, curve: FramedCurve) -> FloatArray:

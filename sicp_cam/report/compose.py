@@ -14,9 +14,16 @@ from sicp_cam.findings import Finding, Level
 from sicp_cam.model import FloatArray, Scan, ToolPath, TriangleMesh
 from sicp_cam.registration.result import Registration
 from sicp_cam.report import result_tables
+from sicp_cam.report.confidence_table import confidence
 from sicp_cam.report.deviation import out_of_surface
 from sicp_cam.report.document import Picture, ReportDocument
-from sicp_cam.report.figures import SEGMENT_STEPS, correction_along_contour, error_along_contour
+from sicp_cam.report.figures import (
+    BAND_MEANS,
+    SEGMENT_STEPS,
+    correction_along_contour,
+    error_along_contour,
+    uncertainty_along_contour,
+)
 from sicp_cam.report.path_view import largest_correction, paths_scene
 from sicp_cam.report.scenes import Scene, render
 from sicp_cam.report.views import deviation_scene, sample, subdivision_scene
@@ -42,6 +49,7 @@ _SIGNS = (
 _CAPTIONS = {
     "error": f"distance between scan and contour along the contour. {result_tables.FIT} "
     "Where a curve is missing, nothing was measured.",
+    "uncertainty": f"how sure the corrected contour is. {BAND_MEANS}",
     "deviation": "Scan points on the rigidly registered part, coloured by how far they lie out (of the surface).",
     "subdivision": "segments, subdivision points and stability points on the corrected contour.",
     "paths": "Nominal path, rigidly registered, and corrected path with tool axes; true to scale.",
@@ -84,6 +92,8 @@ def pictures(
     drawn: dict[str, bytes] = {}
     for contour in registration.contours:
         drawn[f"error_{contour.number}.png"] = error_along_contour(contour, registration.method, tolerance_mm)
+        if contour.normal_u_mm is not None and contour.out_u_mm is not None:
+            drawn[f"uncertainty_{contour.number}.png"] = uncertainty_along_contour(contour, registration.method)
         drawn[f"correction_{contour.number}.png"] = correction_along_contour(contour)
     scenes = _scenes(part_mesh, scan, registration, path_rigid, path_corrected, tolerance_mm)
     try:
@@ -122,6 +132,7 @@ def document(
     tables = (
         result_tables.inputs(result),
         result_tables.statistics(result),
+        confidence(result),
         result_tables.gates(result),
         result_tables.findings(result),
         result_tables.details(result),

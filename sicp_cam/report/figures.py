@@ -1,4 +1,4 @@
-"""Curves over the arc length of a contour: the error before and after, and what was corrected."""
+"""Curves over the arc length of a contour: error before and after, the stated uncertainty, and what was corrected."""
 
 from __future__ import annotations
 
@@ -16,10 +16,22 @@ from sicp_cam.model import FloatArray
 from sicp_cam.registration.result import RegisteredContour
 from sicp_cam.report.lettering import STYLE, png
 from sicp_cam.report.result_tables import FIT, METHODS
-from sicp_cam.report.statistics import both
+from sicp_cam.report.statistics import BAND, both
 from sicp_cam.report.stretches import clipped, marked
 
-__all__ = ["SEGMENT_STEPS", "correction_along_contour", "error_along_contour"]
+__all__ = [
+    "BAND_MEANS",
+    "SEGMENT_STEPS",
+    "correction_along_contour",
+    "error_along_contour",
+    "uncertainty_along_contour",
+]
+
+BAND_MEANS = (
+    f"Band: {BAND} stated standard uncertainties to either side of the corrected contour (zero line), in gaps too: "
+    "95 % of the true edge should lie in it."
+)
+"""What the band is. It lies about the contour, not about the residual, which is taken from few points and scatters."""
 
 SEGMENT_STEPS = (
     "Each segment moves as one rigid body and goes over to the next at their border: steps or a sawtooth with the "
@@ -27,16 +39,18 @@ SEGMENT_STEPS = (
 )
 """What the steps of the correction are; true for a contour without segments too, which has neither."""
 
-BEFORE, AFTER, GAP = "#c8782c", "#1f4fa3", "#f3d9dc"
+BEFORE, AFTER, GAP, SURE = "#c8782c", "#1f4fa3", "#f3d9dc", "#a9c3ea"
 INTO, OUT, TURN = "#2f7d4f", "#7a3f98", "#444444"
 NORMAL, OUT_OF = "normal (across the edge)", "out (of the surface)"
+_BAND_KEY = ("95 % band of the corrected contour", SURE)
 
 
 def error_along_contour(contour: RegisteredContour, method: str, tolerance_mm: float | None = None) -> bytes:
     """Return the PNG of the residuals over arc length, rigid against the method (the paper's figure 10).
 
     Three panels: the distance across the contour, then its parts across the edge and out of the surface. Stretches that
-    the scan does not show are shaded and have no curve; subdivision points are ticks at the top.
+    the scan does not show are shaded and have no curve; subdivision points are ticks at the top. The two parts have the
+    95 % band of the corrected contour, if it states its uncertainty.
 
     Parameters
     ----------
@@ -62,10 +76,42 @@ def error_along_contour(contour: RegisteredContour, method: str, tolerance_mm: f
                 _curve(panel, contour, np.where(contour.covered, after[index], np.nan), AFTER)
             _tolerance(panel, tolerance_mm, both_signs=index > 0)
             panel.set_ylabel(title)
+        _band(axes[1], contour, contour.normal_u_mm)
+        _band(axes[2], contour, contour.out_u_mm)
         axes[0].set_ylim(bottom=0.0)
 
     keys = [("rigid ICP", BEFORE)] + ([(METHODS.get(method, method), AFTER)] if method != "rigid" else [])
+    keys += [_BAND_KEY] if contour.normal_u_mm is not None else []
     return _figure(f"Contour {contour.number}: distance to the scan along the contour", contour, 3, draw, keys, FIT)
+
+
+def uncertainty_along_contour(contour: RegisteredContour, method: str) -> bytes:
+    """Return the PNG of the method's residuals with the 95 % band of the contour, on the scale of the band.
+
+    Two panels: across the edge and out of the surface. The band is drawn through the stretches that the scan does not
+    show too; they are shaded and have no curve.
+
+    Parameters
+    ----------
+    contour
+        A registered contour that states its uncertainty.
+    method
+        Name of the method that `contour.after` belongs to.
+    """
+    parts = (
+        (f"{NORMAL}\n+ into the material / mm", contour.after.normal_mm, contour.normal_u_mm),
+        (f"{OUT_OF}\n+ outward / mm", contour.after.out_mm, contour.out_u_mm),
+    )
+
+    def draw(axes: list[Axes]) -> None:
+        for panel, (title, residual, u_mm) in zip(axes, parts, strict=True):
+            _band(panel, contour, u_mm)
+            _curve(panel, contour, np.where(contour.covered, residual, np.nan), AFTER)
+            panel.axhline(0.0, color="#808080", lw=0.8)
+            panel.set_ylabel(title)
+
+    keys = [(METHODS.get(method, method), AFTER), _BAND_KEY]
+    return _figure(f"Contour {contour.number}: how sure the corrected contour is", contour, 2, draw, keys, BAND_MEANS)
 
 
 def correction_along_contour(contour: RegisteredContour) -> bytes:
@@ -134,10 +180,22 @@ def _figure(
 
 def _curve(panel: Axes, contour: RegisteredContour, values: FloatArray, colour: str) -> None:
     """Draw a value per station, with a break where it is NaN, and a loop closed over its seam."""
+    panel.plot(*_round_the_seam(contour, values), color=colour, lw=1.4)
+
+
+def _band(panel: Axes, contour: RegisteredContour, u_mm: FloatArray | None) -> None:
+    """Fill what lies within 95 % of the zero line, above the shade of the gaps and below the curves."""
+    if u_mm is not None:
+        s, half = _round_the_seam(contour, BAND * u_mm)
+        panel.fill_between(s, -half, half, color=SURE, lw=0, zorder=0.8)
+
+
+def _round_the_seam(contour: RegisteredContour, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return arc lengths and values of the stations; those of a loop end where they began."""
     s = contour.nominal.s_mm
-    if contour.nominal.closed:
-        s, values = np.append(s, contour.nominal.length_mm), np.append(values, values[0])
-    panel.plot(s, values, color=colour, lw=1.4)
+    if not contour.nominal.closed:
+        return s, values
+    return np.append(s, contour.nominal.length_mm), np.append(values, values[0])
 
 
 def _tolerance(panel: Axes, tolerance_mm: float | None, *, both_signs: bool) -> None:

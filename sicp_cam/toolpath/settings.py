@@ -48,8 +48,23 @@ class GateLimits:
         Largest mean distance between scan and corrected contour, out of the surface.
     edge_residual_mm
         Largest mean distance between scan edge and corrected contour, in the surface.
+    size_mm
+        Largest mean distance of the scanned edge to one side of a closed contour: more is not bent but not cut to size.
+    leave_out_mm
+        Largest difference (RMS) of the contours found from two halves of the scan, where the method compares them.
+    uncertainty_mm
+        Largest standard uncertainty of the contour where the scan shows it, where the method states one.
+    freedom_mm
+        Largest move of the contour across itself, RMS, that the scan leaves open to a start pose 10 mm off.
+    symmetry
+        Least misfit of the next best start pose over that of the one found; 1.5 is demanded in any case.
     side
         Largest misfit of a given pose over that of the part turned over; above 1 the other side fits better.
+    pose_mm
+        Largest distance of the registered contour from where the given start pose has it; a border of the scan that is
+        no edge of the part pulls the part along. Sliding along the edge does not count.
+    pose_deg
+        Largest turn of the contour's outer side from the given start pose, the median along the contour.
     stretch
         Largest relative change of the contour's length; a part that bends keeps it.
     in_surface_mm
@@ -59,7 +74,17 @@ class GateLimits:
     axis_deg
         Largest turn of a tool axis by the deformation, beyond the rigid pose.
     jump_mm
-        Largest step of the correction between neighbouring points, beyond what their distance explains.
+        Largest step of the correction between neighbouring points, or where the path returns to a place, beyond what
+        their distance explains.
+    slope
+        Largest change of the correction over 10 mm of cut, in mm per mm.
+    axis_slope
+        Largest turn of the tool axis over 10 mm of cut, beyond that of the rigid pose, in degrees per mm.
+    travel
+        Least way of a corrected cutting move along its nominal direction, over its nominal way; below 0 the cut would
+        run backwards.
+    crossing_mm
+        Largest nominal distance of two places of the cut that touch after the correction: the cut crosses itself.
     """
 
     path_distance_mm: float = 20.0
@@ -67,9 +92,20 @@ class GateLimits:
     coverage: float = 0.5
     residual_mm: float = 0.5
     edge_residual_mm: float = 3.0
+    size_mm: float = 1.0
+    leave_out_mm: float = 0.6
+    uncertainty_mm: float = 1.0
+    freedom_mm: float = 1.0
+    symmetry: float = 1.5
     side: float = 2.0
+    pose_mm: float = 25.0
+    pose_deg: float = 8.0
     stretch: float = 0.02
     in_surface_mm: float = 6.0
     correction_mm: float = 30.0
     axis_deg: float = 15.0
     jump_mm: float = 0.5
+    slope: float = 0.3
+    axis_slope: float = 0.5
+    travel: float = 0.25
+    crossing_mm: float = 3.0

@@ -46,6 +46,9 @@ class CorrectedPath:
         (n,) True for moves that are not in the source.
     feed_distance_mm
         (m,) distance of the steps of all feed moves from the contours that they follow.
+    u_mm
+        (n,) standard uncertainty (1 sigma) of the corrected contour across itself, hypot(normal, out), where each move
+        meets it; NaN for moves off the contour. None where no contour states one.
     """
 
     nominal: ToolPath
@@ -54,6 +57,7 @@ class CorrectedPath:
     status: tuple[Status, ...]
     added: BoolArray
     feed_distance_mm: FloatArray = field(default_factory=lambda: np.zeros(0))
+    u_mm: FloatArray | None = None
 
 
 def correct_path(
@@ -94,9 +98,11 @@ def correct_path(
     rigid = replace(nominal, tips_mm=apply(T_scan_part, nominal.tips_mm), axes=rotate(T_scan_part, nominal.axes))
     corrected = replace(nominal, tips_mm=tips[kept], axes=axes[kept])
     cuts = np.where(bent[source], cutting, _mostly(cutting, steps, len(path))[source])[kept]
-    status = _status(nominal, cuts, assignment.contour[kept], contours)
+    follows = assignment.contour[kept]
+    s_mm = _places(nominal, follows, contours)
+    status, u_mm = _status(cuts, s_mm, follows, contours), _uncertainty(cuts, s_mm, follows, contours)
     distance = assignment.distance_mm[~path.rapid[source]]
-    return CorrectedPath(nominal, rigid, corrected, status, steps.fraction[kept] < 1.0, distance)
+    return CorrectedPath(nominal, rigid, corrected, status, steps.fraction[kept] < 1.0, distance, u_mm)
 
 
 def carried(
@@ -183,17 +189,46 @@ def _with_steps(path: ToolPath, steps: Steps, kept: BoolArray) -> ToolPath:
     )
 
 
-def _status(
-    path: ToolPath, cutting: BoolArray, follows: IntArray, contours: Sequence[RegisteredContour]
-) -> tuple[Status, ...]:
-    seen = np.zeros(len(path), dtype=bool)
+def _places(path: ToolPath, follows: IntArray, contours: Sequence[RegisteredContour]) -> FloatArray:
+    """Return the (n,) arc length of each move on the contour that it follows."""
+    s_mm = np.zeros(len(path))
     for number, contour in enumerate(contours):
         rows = np.flatnonzero(follows == number)
-        s_mm, _ = nearest(path.tips_mm[rows], contour.nominal)
-        station = np.searchsorted(contour.nominal.s_mm, s_mm, side="right") - 1
+        s_mm[rows], _ = nearest(path.tips_mm[rows], contour.nominal)
+    return s_mm
+
+
+def _status(
+    cutting: BoolArray, s_mm: FloatArray, follows: IntArray, contours: Sequence[RegisteredContour]
+) -> tuple[Status, ...]:
+    seen = np.zeros(len(s_mm), dtype=bool)
+    for number, contour in enumerate(contours):
+        rows = np.flatnonzero(follows == number)
+        station = np.searchsorted(contour.nominal.s_mm, s_mm[rows], side="right") - 1
         after = (station + 1) % len(contour.covered) if contour.nominal.closed else station + 1
         seen[rows] = contour.covered[station] & contour.covered[np.minimum(after, len(contour.covered) - 1)]
     return tuple(
         Status.APPROACH if not cuts else Status.COVERED if covered else Status.BRIDGED
         for cuts, covered in zip(cutting, seen, strict=True)
     )
+
+
+def _uncertainty(
+    cutting: BoolArray, s_mm: FloatArray, follows: IntArray, contours: Sequence[RegisteredContour]
+) -> FloatArray | None:
+    """Return the (n,) standard uncertainty of the contour at each cutting move, else NaN; None if none states it."""
+    u_mm, stated = np.full(len(s_mm), np.nan), False
+    for number, contour in enumerate(contours):
+        if contour.normal_u_mm is None or contour.out_u_mm is None:
+            continue
+        stated = True
+        rows = np.flatnonzero(cutting & (follows == number))
+        normal, out = (_at_places(values, s_mm[rows], contour) for values in (contour.normal_u_mm, contour.out_u_mm))
+        u_mm[rows] = np.hypot(normal, out)
+    return u_mm if stated else None
+
+
+def _at_places(values: FloatArray, s_mm: FloatArray, contour: RegisteredContour) -> FloatArray:
+    """Return (k,) values of the stations linearly between them, over the seam of a closed contour too."""
+    nominal = contour.nominal
+    return np.interp(s_mm, nominal.s_mm, values, period=nominal.length_mm if nominal.closed else None)

@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from sicp_cam.contour.boundary import cloud_rim, mesh_boundary_edges, mesh_rim, surface_normals
+from sicp_cam.contour.boundary import (
+    cloud_rim,
+    local_planes,
+    mesh_boundary_edges,
+    mesh_rim,
+    surface_normals,
+    without,
+)
 from sicp_cam.model import Scan
 from sicp_cam.registration.scan_surface import without_copies
 from sicp_cam.rigid_motion import apply, rotate
@@ -18,6 +25,10 @@ def square_cloud(count=30, jitter=0.3, noise=0.03, seed=0):
     return np.column_stack([flat, rng.normal(0.0, noise, len(flat))]), on_border
 
 
+def rim_of(points):
+    return cloud_rim(points, local_planes(points, cKDTree(points)))
+
+
 @pytest.fixture(scope="module")
 def annulus(synthetic):
     """A ring between radii 40 and 80 as a mesh: vertices (n, 3) and faces."""
@@ -29,7 +40,7 @@ def annulus(synthetic):
 def test_the_rim_of_a_square_cloud_is_its_border(synthetic):
     points, on_border = square_cloud()
     T = synthetic.random_pose(1)
-    rim = cloud_rim(apply(T, points), cKDTree(apply(T, points)))
+    rim = rim_of(apply(T, points))
     found = np.zeros(len(points), dtype=bool)
     found[rim.indices] = True
     assert found[on_border].mean() > 0.95
@@ -40,7 +51,7 @@ def test_the_rim_of_a_square_cloud_is_its_border(synthetic):
 def test_the_open_side_of_a_square_cloud_looks_out_of_it(synthetic):
     points, _ = square_cloud()
     T = synthetic.random_pose(2)
-    rim = cloud_rim(apply(T, points), cKDTree(apply(T, points)))
+    rim = rim_of(apply(T, points))
     away = points[rim.indices] - points.mean(axis=0)
     sides = np.abs(away[:, :2]).argmax(axis=1)
     outward = np.eye(3)[sides] * np.sign(away[np.arange(len(away)), sides])[:, None]
@@ -53,7 +64,7 @@ def test_the_rim_of_a_cloud_lies_inside_the_material_at_hole_and_outside(synthet
     outlines = [synthetic.circle(40.0), synthetic.circle(80.0, hole=False)]
     uv = synthetic.material(outlines, spacing_mm=SPACING)
     points = np.column_stack([uv, np.zeros(len(uv))])
-    rim = cloud_rim(points, cKDTree(points))
+    rim = rim_of(points)
     radius = np.linalg.norm(rim.points_mm, axis=1)
     at_hole = radius < 60.0
     assert ((radius > 40.0) & (radius < 80.0)).all()
@@ -113,5 +124,30 @@ def test_a_cloud_in_which_every_point_stands_several_times_keeps_its_rim(copies)
     points, on_border = square_cloud()
     once = without_copies(Scan(np.concatenate([points] * copies))).points_mm
     np.testing.assert_array_equal(once, points)
-    rim = cloud_rim(once, cKDTree(once))
+    rim = rim_of(once)
     assert np.isin(np.flatnonzero(on_border), rim.indices).mean() > 0.9
+
+
+def test_planes_hold_their_neighbours_nearest_first_and_reach_to_the_furthest(synthetic):
+    points, _ = square_cloud(noise=0.0)
+    T = synthetic.random_pose(3)
+    planes = local_planes(apply(T, points), cKDTree(apply(T, points)))
+    np.testing.assert_array_equal(planes.neighbours[:, 0], np.arange(len(points)))
+    assert (np.diff(planes.distances_mm, axis=1) >= 0.0).all()
+    np.testing.assert_allclose(np.abs(planes.normals @ T[:3, 2]), 1.0, atol=1e-9)
+    groups = apply(T, points)[planes.neighbours]
+    np.testing.assert_allclose(planes.centres_mm, groups.mean(axis=1), atol=1e-9)
+    away = np.linalg.norm(groups - planes.centres_mm[:, None], axis=2)
+    np.testing.assert_allclose(planes.radii_mm, away.max(axis=1), atol=1e-9)
+
+
+def test_planes_without_some_points_are_those_of_a_cloud_that_never_had_them():
+    points, _ = square_cloud()
+    dropped = np.random.default_rng(5).random(len(points)) < 0.03
+    left = points[~dropped]
+    found = without(local_planes(points, cKDTree(points)), left, cKDTree(left), dropped)
+    exact = local_planes(left, cKDTree(left))
+    np.testing.assert_array_equal(found.neighbours, exact.neighbours)
+    for name in ("distances_mm", "centres_mm", "radii_mm"):
+        np.testing.assert_allclose(getattr(found, name), getattr(exact, name), atol=1e-12)
+    np.testing.assert_allclose(np.abs(np.sum(found.normals * exact.normals, axis=1)), 1.0, atol=1e-12)

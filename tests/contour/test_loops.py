@@ -2,11 +2,15 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from sicp_cam.contour.boundary import cloud_rim, mesh_boundary_edges
+from sicp_cam.contour.boundary import cloud_rim, local_planes, mesh_boundary_edges
 from sicp_cam.contour.loops import mesh_loops, resampled, rim_loops
 from sicp_cam.rigid_motion import apply
 
 SPACING = 2.0
+
+
+def rim_of(points):
+    return cloud_rim(points, local_planes(points, cKDTree(points)))
 
 
 def length(loop):
@@ -23,7 +27,7 @@ def test_an_annulus_has_two_loops_of_the_right_lengths(synthetic, ring_outlines,
     uv = synthetic.material(ring_outlines, sampling=sampling, spacing_mm=SPACING, seed=4)
     T = synthetic.random_pose(4)
     points = apply(T, synthetic.dome(500.0, 900.0)(uv))
-    loops = rim_loops(cloud_rim(points, cKDTree(points)), SPACING, 100.0)
+    loops = rim_loops(rim_of(points), SPACING, 100.0)
     assert len(loops) == 2
     tolerance = 0.05 if sampling == "jittered" else 0.15
     assert length(loops[0]) == pytest.approx(2 * np.pi * 80.0, rel=tolerance)
@@ -33,7 +37,7 @@ def test_an_annulus_has_two_loops_of_the_right_lengths(synthetic, ring_outlines,
 def test_a_walk_goes_once_around_the_centre(synthetic, ring_outlines):
     uv = synthetic.material(ring_outlines, spacing_mm=SPACING, seed=5)
     points = synthetic.plane(uv)
-    for loop in rim_loops(cloud_rim(points, cKDTree(points)), SPACING, 100.0):
+    for loop in rim_loops(rim_of(points), SPACING, 100.0):
         turn = np.diff(np.unwrap(np.arctan2(loop[:, 1], loop[:, 0])))
         assert abs(turn.sum()) == pytest.approx(2 * np.pi, abs=0.4)
 
@@ -43,17 +47,13 @@ def test_the_loop_steps_over_a_narrow_gap_and_goes_around_a_wide_one(synthetic, 
     hole = synthetic.circle(60.0)
     uv = synthetic.material([hole], spacing_mm=SPACING, seed=6)
     points = synthetic.plane(synthetic.without_gaps(uv, hole, [(100.0, 100.0 + gap)], depth_mm=25.0))
-    (loop,) = [
-        loop
-        for loop in rim_loops(cloud_rim(points, cKDTree(points)), SPACING, 200.0)
-        if np.linalg.norm(loop, axis=1).max() < 100.0
-    ]
+    (loop,) = [loop for loop in rim_loops(rim_of(points), SPACING, 200.0) if np.linalg.norm(loop, axis=1).max() < 100.0]
     assert length(loop) == pytest.approx(hole.length_mm + around, rel=0.06)
 
 
 def test_short_loops_are_dropped(synthetic, ring_outlines):
     points = synthetic.plane(synthetic.material(ring_outlines, spacing_mm=SPACING, seed=7))
-    loops = rim_loops(cloud_rim(points, cKDTree(points)), SPACING, 400.0)
+    loops = rim_loops(rim_of(points), SPACING, 400.0)
     assert len(loops) == 1
     assert length(loops[0]) > 400.0
 

@@ -13,7 +13,6 @@ import sicp_cam
 from sicp_cam.alignment import read_alignment
 from sicp_cam.errors import AmbiguousPoseError, ReportError
 from sicp_cam.rigid_motion import apply, inverse
-from sicp_cam.toolpath.gates import GATE_NAMES
 
 
 @pytest.fixture
@@ -243,15 +242,34 @@ def test_an_override_lets_the_program_be_and_stands_in_all_that_is_written(cli, 
     done = cli(*words, "--set", "gates.correction_mm=0.1", "--json")
     assert done.code == 0
     document = json.loads(done.out)
-    states = {gate["name"]: gate["state"] for gate in document["gates"]}
-    assert states == {name: "overridden" if name == "correction_mm" else "ok" for name in GATE_NAMES}
+    (gate,) = [gate for gate in document["gates"] if gate["state"] != "ok"]
+    assert (gate["name"], gate["state"], gate["limit"]) == ("correction_mm", "overridden", 0.1)
     assert document["status"] == "warn"
     assert [f["level"] for f in document["findings"] if "correction_mm was overridden" in f["message"]] == ["warn"]
     assert "correction_mm was overridden" in done.err
     assert document == json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     for name in ("disc.nc", "disc/start.pgx"):
         text = (tmp_path / "out" / name).read_text(encoding="utf-8").lower()
-        assert "gate correction_mm overridden by the operator" in text
+        told = f"gate correction_mm overridden by the operator: {gate['value']:.4g}, limit 0.1"
+        assert told in " ".join(text.replace("(", " ").replace(")", " ").replace("//", " ").split())
+    header, *rows = (tmp_path / "out" / "disc.csv").read_text(encoding="ascii").splitlines()
+    assert f"correction_mm overridden by the operator: {gate['value']:.4g} limit 0.1" in header.split(",")[-1]
+    assert all(row.endswith(",1") for row in rows)
+
+
+def test_what_the_method_is_known_for_is_a_warning_and_no_program_under_strict(cli, refused, disc, tmp_path):
+    """The rigid pose misses a bent part: the operator asked for it, and is told."""
+    line = refused(7, *disc(method="rigid"), "--strict")
+    assert "residual_mm" in line and "limit 0.5" in line
+    done = cli(*disc(method="rigid"))
+    assert done.code == 0
+    assert "warning" in done.err and "residual_mm" in done.err and "limit 0.5" in done.err
+
+
+def test_a_start_pose_far_off_is_exit_4_and_names_its_gate(refused, disc):
+    line = refused(4, *disc(), "--set", "gates.pose_mm=1", "--set", "gates.pose_deg=0.5")
+    assert "--override pose_mm --override pose_deg" in line
+    assert "--override pose_mm" not in refused(4, *disc(), "--set", "gates.pose_deg=0.5")
 
 
 # ---- 6: the output ----

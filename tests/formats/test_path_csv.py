@@ -49,6 +49,20 @@ def test_reads_the_table_that_this_package_writes(tmp_path: Path) -> None:
         read(tmp_path, text, units="inch")
 
 
+def test_reads_the_table_with_uncertainties_and_empty_cells(tmp_path: Path) -> None:
+    text = (
+        "x,y,z,i,j,k,feed,rapid,status,u_mm\n1.0000,2.0000,3.0000,0.0,0.0,1.0,0.0000,1,approach,\n"
+        "4.5000,-5.0000,6.0000,0.0,0.6,0.8,1500.0000,0,covered,0.050000\n"
+    )
+    path = read(tmp_path, text)
+    assert path.tips_mm.tolist() == TIPS
+    assert path.rapid.tolist() == [True, False]
+    (finding,) = path.findings
+    assert finding.code == 315
+    assert "status" in finding.message and "u_mm" in finding.message
+    assert path.source is not None and path.source.unit_stated
+
+
 @pytest.mark.parametrize(
     "text",
     [

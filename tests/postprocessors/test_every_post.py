@@ -35,8 +35,9 @@ LINKED = {
     "log_messages": "true",
     "shoulder": "lefty",
 }
+UNCERTAINTY = np.ma.array(np.arange(6) / 70.0, mask=[True, False, False, False, False, True])
 CASES = {
-    "csv": lambda: PathCsv().write(simple_program(columns={"uncertainty_mm": np.arange(6) / 7.0})),
+    "csv": lambda: PathCsv().write(simple_program(columns={"u_mm": UNCERTAINTY})),
     "csv-nasty": lambda: PathCsv().write(nasty_program()),
     "gcode-vector": lambda: GCode().write(simple_program()),
     "gcode-rotary-ac": lambda: GCode({"orientation": "rotary", "line_numbers": 10}).write(simple_program()),

@@ -13,7 +13,7 @@ from sicp_cam.contour.frames import FramedCurve, moved, orthonormal
 from sicp_cam.model import Event, EventKind, ToolPath
 from sicp_cam.registration.result import RegisteredContour, Residuals
 from sicp_cam.rigid_motion import apply, from_parts, rotate
-from sicp_cam.toolpath.gates import path_gates
+from sicp_cam.toolpath.path_gates import path_gates
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
 from sicp_cam.toolpath.steps import divided, feed_steps
 from sicp_cam.toolpath.transfer import correct_path

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from sicp_cam.registration.gauss_newton import Rows, freedoms, motion_step, stacked, tukey
+from sicp_cam.registration.gauss_newton import Rows, freedoms, motion_step, motion_steps, stacked, tukey
 from sicp_cam.rigid_motion import apply, exponential, from_parts
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -68,10 +68,36 @@ def test_the_prior_holds_the_freedoms_that_the_equations_leave_open():
 def test_the_prior_draws_the_open_freedoms_to_where_it_wants_them_and_no_other():
     points = np.column_stack([np.random.default_rng(3).uniform(-100, 100, (60, 2)), np.zeros(60)])
     wanted = from_parts(Rotation.from_rotvec([0.0, 0.0, 0.02]).as_matrix(), [3.0, -4.0, 7.0])
-    step = motion_step(plane_rows(points, np.full(60, 2.0)), 1e-6, wanted)
+    (step,) = motion_steps(plane_rows(points, np.full(60, 2.0)), np.zeros(60, dtype=int), 1e-6, wanted[None])
     centre = points.mean(axis=0)
     np.testing.assert_allclose(step @ [*centre, 1.0], [*(wanted @ [*centre, 1.0])[:2], 2.0, 1.0], atol=1e-3)
     np.testing.assert_allclose(Rotation.from_matrix(step[:3, :3]).as_rotvec(), [0.0, 0.0, 0.02], atol=1e-6)
+
+
+def test_the_groups_of_a_stack_are_solved_each_for_itself():
+    rng, parts, group, towards = np.random.default_rng(4), [], [], []
+    for i in range(5):
+        points = rng.uniform(-50.0, 50.0, (20 + i, 3)) + 100.0 * i
+        wanted = exponential(rng.normal(0.0, [0.01] * 3 + [1.0] * 3), points.mean(axis=0))
+        parts.append(rows_to(points, apply(wanted, points), rng.uniform(0.5, 1.0, len(points))))
+        group.append(np.full(3 * len(points), i))
+        towards.append(exponential(rng.normal(0.0, [0.01] * 3 + [1.0] * 3), points.mean(axis=0)))
+    shuffled = rng.permutation(sum(len(g) for g in group))
+    rows, of = stacked(*parts), np.concatenate(group)[shuffled]
+    mixed = Rows(*(getattr(rows, name)[shuffled] for name in Rows.__slots__))
+    together = motion_steps(mixed, of, 0.1, np.stack(towards))
+    for i, (part, T) in enumerate(zip(parts, towards, strict=True)):
+        (alone,) = motion_steps(part, np.zeros(len(part.weights), dtype=int), 0.1, T[None])
+        np.testing.assert_allclose(together[i], alone, atol=1e-9)
+
+
+def test_a_group_without_weight_stays_where_it_is_whatever_the_prior_wants():
+    points = np.random.default_rng(5).uniform(-50.0, 50.0, (20, 3))
+    rows = stacked(rows_to(points, points + UP), rows_to(points, points + UP, np.zeros(20)))
+    away = np.tile(from_parts(np.eye(3), [9.0, 0.0, 0.0]), (2, 1, 1))
+    steps = motion_steps(rows, np.repeat([0, 1], 60), 0.1, away)
+    np.testing.assert_array_equal(steps[1], np.eye(4))
+    assert steps[0][0, 3] > 0.5
 
 
 def test_a_circle_leaves_the_rotation_about_its_axis_open():

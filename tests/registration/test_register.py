@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from sicp_cam.errors import RegistrationError
+from sicp_cam.findings import Level
 from sicp_cam.model import Scan
 from sicp_cam.registration.register import register_contours
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
@@ -33,8 +34,8 @@ def test_every_one_of_several_contours_is_corrected_under_its_number(synthetic, 
     for contour in found.contours:
         error = synthetic.errors(contour.corrected, outlines[contour.number], bent, pose)
         assert contour.covered.mean() > 0.95
-        assert np.abs(error.out[contour.covered]).mean() < 0.06
-        assert np.abs(error.normal[contour.covered]).mean() < 0.3
+        assert np.abs(error.out[contour.covered]).mean() < 0.027
+        assert np.abs(error.normal[contour.covered]).mean() < 0.1
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -43,10 +44,10 @@ def test_the_result_tells_what_was_measured(registered, method):
     assert found.method == method
     assert is_rigid(found.T_scan_part)
     assert found.spacing_mm == pytest.approx(2.0, rel=0.12)
-    assert found.noise_mm == pytest.approx(0.05, rel=0.3)
+    assert found.noise_mm == pytest.approx(0.05, rel=0.3 if method == "paper" else 0.1)
     assert found.freedoms.shape == (6,)
     assert found.symmetry is None  # the start was given
-    assert bool(found.contours[0].segments) == (method != "rigid")
+    assert bool(found.contours[0].segments) == (method in ("sicp", "paper"))
 
 
 def test_without_a_start_the_pose_is_found_from_the_geometry(synthetic):
@@ -57,8 +58,8 @@ def test_without_a_start_the_pose_is_found_from_the_geometry(synthetic):
     found = register_contours({1: synthetic.contour(egg, nominal)}, scan, None, settings=SIXTEEN)
     error = synthetic.errors(found.contours[0].corrected, egg, bent, pose)
     assert found.symmetry > 1.5
-    assert np.abs(error.out).mean() < 0.05
-    assert np.abs(error.normal).mean() < 0.3
+    assert np.abs(error.out).mean() < 0.012
+    assert np.abs(error.normal).mean() < 0.12
 
 
 def test_a_triangle_mesh_is_registered_like_a_cloud(synthetic, sagging):
@@ -82,8 +83,8 @@ def test_twice_the_spacing_still_follows_the_part(synthetic, sagging):
     found = register_contours({1: sagging.contour}, scan, sagging.start, settings=NEAR)
     error = synthetic.errors(found.contours[0].corrected, sagging.outline, sagging.bent, sagging.pose)
     assert found.spacing_mm == pytest.approx(4.0, rel=0.12)
-    assert np.abs(error.out).mean() < 0.1
-    assert np.abs(error.normal).mean() < 0.5
+    assert np.abs(error.out).mean() < 0.02
+    assert np.abs(error.normal).mean() < 0.35
 
 
 def test_the_inputs_are_left_alone(sagging):
@@ -135,12 +136,30 @@ def test_points_that_are_no_surface_are_refused(sagging, points, given):
         register_contours({1: sagging.contour}, Scan(some), np.eye(4) if given else None, settings=NEAR)
 
 
-def test_a_part_that_is_not_cut_yet_is_refused(synthetic, sagging):
-    """The material goes on beyond the contour on both sides: there is no edge to find."""
+@pytest.fixture(scope="module")
+def uncut(synthetic, sagging):
+    """The sagging part before its opening is cut: the material goes on beyond the contour on both sides."""
     uv = synthetic.material([synthetic.rounded_rectangle(320.0, 260.0, 20.0)], depth_mm=200.0)
-    scan = synthetic.scan(uv, sagging.nominal, pose=sagging.pose)
-    with pytest.raises(RegistrationError, match="of the scan's rim lie within"):
-        register_contours({1: sagging.contour}, scan, sagging.start, settings=NEAR)
+    return synthetic.scan(uv, sagging.bent, pose=sagging.pose)
+
+
+@pytest.mark.parametrize("method", ["paper", "projection"])
+def test_a_method_that_needs_the_edge_refuses_a_part_that_is_not_cut_yet(sagging, uncut, method):
+    with pytest.raises(RegistrationError, match=r"contour 1 is not cut yet, .* use --method sicp or rigid"):
+        register_contours({1: sagging.contour}, uncut, sagging.pose, method=method, settings=NEAR)
+
+
+def test_a_part_that_is_not_cut_yet_is_followed_out_of_the_surface_and_stays_in_it(synthetic, sagging, uncut):
+    found = register_contours({1: sagging.contour}, uncut, sagging.pose, settings=NEAR)
+    (contour,) = found.contours
+    error = synthetic.errors(contour.corrected, sagging.outline, sagging.bent, sagging.pose)
+    assert contour.uncut
+    assert any(finding.code == 406 and finding.level is Level.WARN for finding in found.findings)
+    assert contour.normal_u_mm is None  # nothing is known of it
+    assert np.abs(error.out).mean() < 0.012
+    exact = synthetic.contour(sagging.outline, sagging.nominal).points_mm
+    aside = np.sum((contour.corrected.points_mm - apply(sagging.pose, exact)) * contour.corrected.inward, axis=1)
+    assert np.abs(aside).max() < 0.9
 
 
 def test_the_scan_of_another_part_is_refused_or_its_misfit_told(synthetic, sagging):
@@ -179,7 +198,7 @@ def test_a_narrow_gap_at_the_seam_is_bridged_like_any_other(synthetic, sagging):
         error = synthetic.errors(contour.corrected, sagging.outline, sagging.bent, sagging.pose)
         assert not contour.covered.all()
         worst.append(error.both[~contour.covered].max())
-    assert max(worst) < 1.2
+    assert max(worst) < 0.2
 
 
 def test_stability_points_are_not_needed_where_the_edge_holds_all(synthetic, sagging):
@@ -187,7 +206,7 @@ def test_stability_points_are_not_needed_where_the_edge_holds_all(synthetic, sag
     found = register_contours({1: bare}, sagging.scan, sagging.start, settings=SIXTEEN)
     error = synthetic.errors(found.contours[0].corrected, sagging.outline, sagging.bent, sagging.pose)
     covered = found.contours[0].covered
-    assert np.abs(error.out[covered]).mean() < 0.1
+    assert np.abs(error.out[covered]).mean() < 0.02
     assert found.contours[0].stability_scan_mm.shape == (0, 3)
 
 

@@ -33,7 +33,7 @@ def shifted_targets(flat, move, weights=None):
     nominal, _, s = flat
     there = move(at(nominal.curve, s).points_mm)
     trust = np.ones(len(s)) if weights is None else weights
-    return Targets(s, there, trust, trust)
+    return Targets(s, there, trust)
 
 
 def test_pieces_whose_targets_are_met_stay_where_they_are(flat):
@@ -41,7 +41,7 @@ def test_pieces_whose_targets_are_met_stay_where_they_are(flat):
     for segment in segments:
         assert is_rigid(segment.T_scan_part)
         np.testing.assert_allclose(
-            apply(segment.T_scan_part, flat[0].curve.points_mm), flat[0].curve.points_mm, atol=0.1
+            apply(segment.T_scan_part, flat[0].curve.points_mm), flat[0].curve.points_mm, atol=0.02
         )
 
 
@@ -52,9 +52,9 @@ def test_a_common_move_across_the_contour_is_followed_by_every_piece(flat):
     found = at(blended(nominal.curve, parts, segments), s)
     missed = targets.points_scan_mm - found.points_mm
     across = np.sum(missed * found.inward, axis=1)
-    assert np.abs(across).mean() < 0.1
+    assert np.abs(across).mean() < 0.015
     straight = np.maximum(np.abs(found.tangents[:, 0]), np.abs(found.tangents[:, 1])) > 0.999
-    assert np.median(np.abs(across[straight])) < 0.02
+    assert np.median(np.abs(across[straight])) < 0.01
 
 
 def test_a_corner_follows_a_common_move_too(flat):
@@ -62,7 +62,7 @@ def test_a_corner_follows_a_common_move_too(flat):
     targets = shifted_targets(flat, lambda points: points + np.array([1.0, -0.6, 0.0]))
     found = at(blended(nominal.curve, *register(flat, targets)), s)
     across = np.sum((targets.points_scan_mm - found.points_mm) * found.inward, axis=1)
-    assert np.abs(across).max() < 0.1
+    assert np.abs(across).max() < 0.06
 
 
 def test_a_piece_with_its_own_motion_gets_it_and_leaves_the_others(flat):
@@ -79,18 +79,18 @@ def test_a_piece_with_its_own_motion_gets_it_and_leaves_the_others(flat):
     inside = np.convolve(straight, np.ones(25), "same") == 25
     outside = np.convolve(straight, np.ones(25), "same") == 0
     assert inside.sum() > 5
-    np.testing.assert_allclose(depth[inside], 2.0, atol=0.4)
+    np.testing.assert_allclose(depth[inside], 2.0, atol=0.25)
     np.testing.assert_allclose(depth[outside], 0.0, atol=0.4)
 
 
 def test_pieces_do_not_slide_along_the_contour(flat):
     nominal, _, s = flat
     slid = at(nominal.curve, s + 5.0).points_mm  # along the straight sides these targets are met without sliding
-    parts, segments = register(flat, Targets(s, slid, np.ones(len(s)), np.ones(len(s))), pieces=12)
+    parts, segments = register(flat, Targets(s, slid, np.ones(len(s))), pieces=12)
     found = blended(nominal.curve, parts, segments)
     straight = np.maximum(np.abs(nominal.curve.tangents[:, 0]), np.abs(nominal.curve.tangents[:, 1])) > 0.9999
     along = np.sum((found.points_mm - nominal.curve.points_mm) * nominal.curve.tangents, axis=1)
-    assert np.median(np.abs(along[straight])) < 0.3
+    assert np.median(np.abs(along[straight])) < 0.27
 
 
 def test_a_piece_without_targets_keeps_the_primary_pose(synthetic, flat):
@@ -113,7 +113,7 @@ def test_the_papers_correspondence_draws_points_to_the_closest_edge_points(flat)
     parts, segments = register(flat, None, correspondence=point_to_point(closest, 25.0))
     found = at(blended(nominal.curve, parts, segments), s)
     across = np.sum((closest(found.points_mm) - found.points_mm) * found.inward, axis=1)
-    assert np.abs(across).mean() < 0.2  # of 0.6 mm on average; nearest points hold against sliding
+    assert np.abs(across).mean() < 0.12  # of 0.6 mm on average; nearest points hold against sliding
 
 
 def test_pairs_beyond_the_reach_weigh_nothing(flat):
@@ -154,4 +154,4 @@ def test_the_blend_of_different_motions_has_no_jump(synthetic, flat):
     )
     steepest = 0.5 * np.pi / parts.overlaps_mm.min() * apart + 0.05
     assert steps.max() < 0.25 * steepest  # of stations 0.2 mm apart
-    assert np.abs(np.diff(np.vstack([found.outward, found.outward[:1]]), axis=0)).max() < 0.005
+    assert np.abs(np.diff(np.vstack([found.outward, found.outward[:1]]), axis=0)).max() < 0.0005

@@ -10,10 +10,24 @@ import pytest
 
 from sicp_cam.contour.frames import FramedCurve, at, moved, orthonormal
 from sicp_cam.model import FloatArray, Scan, ToolPath, TriangleMesh
-from sicp_cam.registration.result import RegisteredContour, Registration, Residuals, Segment
+from sicp_cam.registration.result import LeaveOut, RegisteredContour, Registration, Residuals, Segment
 from sicp_cam.rigid_motion import apply, exponential
 
 RADIUS, STATIONS, SEGMENTS = 100.0, 314, 6
+U_SEEN, U_GAP, U_OUT = 0.1, 0.4, 0.02
+
+
+def _spread(mean: float, largest: float) -> dict[str, float]:
+    return {"mean_mm": mean, "max_mm": largest}
+
+
+UNCERTAINTY = {
+    **_spread(0.05, 0.1),
+    "normal": _spread(0.04, 0.08),
+    "out": _spread(0.03, 0.06),
+    "bridged": {**_spread(0.25, 0.5), "normal": _spread(0.2, 0.4), "out": _spread(0.15, 0.3)},
+}
+LEAVE_OUT = {"normal": 0.03, "out": 0.04, "both": 0.05}
 POSE = exponential(np.array([0.1, -0.05, 0.3, 40.0, -20.0, 10.0]), np.zeros(3))
 
 
@@ -103,15 +117,25 @@ def result() -> dict[str, Any]:
         "registration": {
             "method": "sicp",
             "T_scan_part": POSE.tolist(),
-            "contours": [{"id": 1, "length_mm": 628.3, "segments": 6, "coverage": 0.9045, "symmetric": True}],
+            "contours": [
+                {
+                    "id": 1,
+                    "length_mm": 628.3,
+                    "segments": 6,
+                    "coverage": 0.9045,
+                    "symmetric": True,
+                    "uncertainty": UNCERTAINTY,
+                    "leave_out": LEAVE_OUT,
+                }
+            ],
             "spacing_mm": 4.0,
             "noise_mm": 0.05,
             "freedoms": [1.0, 0.9, 0.8, 0.5, 0.3, 0.2],
             "rigid": {"normal": worse, "out": worse, "both": worse},
             "corrected": {"normal": numbers, "out": numbers, "both": None},
-            "leave_out": {"normal": numbers, "out": numbers},
+            "leave_out": LEAVE_OUT,
         },
-        "uncertainty": {"mean_mm": 0.05, "max_mm": 0.2},
+        "uncertainty": UNCERTAINTY,
         "correction": {"max_mm": 3.0, "max_axis_deg": 1.5, "max_jump_mm": 0.01},
         "gates": [
             {
@@ -120,6 +144,20 @@ def result() -> dict[str, Any]:
                 "limit": 0.5,
                 "state": "ok",
                 "text": "fraction of the contour on which the scan shows the edge",
+            },
+            {
+                "name": "leave_out_mm",
+                "value": 0.05,
+                "limit": 0.6,
+                "state": "ok",
+                "text": "difference of the contours found from two halves of the scan, mm",
+            },
+            {
+                "name": "uncertainty_mm",
+                "value": 0.08,
+                "limit": 1.0,
+                "state": "ok",
+                "text": "largest standard uncertainty where the scan shows it, mm",
             },
             {
                 "name": "axis_deg",
@@ -163,6 +201,9 @@ def job() -> Job:
         splits,
         stability,
         stability,
+        normal_u_mm=np.where(covered, U_SEEN, U_GAP),
+        out_u_mm=np.full(STATIONS, U_OUT),
+        leave_out=LeaveOut(0.03, 0.04),
     )
     registration = Registration("sicp", POSE, (contour,), 4.0, 0.05, np.array([1.0, 0.9, 0.8, 0.5, 0.3, 0.2]))
     radius, phi = np.meshgrid(np.arange(101.0, 160.0, 4.0), np.linspace(0, 2 * np.pi, 160, endpoint=False))

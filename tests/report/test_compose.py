@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import matplotlib.image
 import numpy as np
@@ -21,7 +22,8 @@ def drawn(job) -> dict[str, bytes]:
 
 def test_every_picture_is_there_and_has_a_content(drawn: dict[str, bytes]) -> None:
     assert set(drawn) == {
-        *("error_1.png", "correction_1.png", "deviation.png", "subdivision_1.png", "paths.png", "paths_enlarged.png"),
+        *("error_1.png", "uncertainty_1.png", "correction_1.png"),
+        *("deviation.png", "subdivision_1.png", "paths.png", "paths_enlarged.png"),
     }
     for name in ("deviation.png", "subdivision_1.png", "paths.png", "paths_enlarged.png"):
         picture = matplotlib.image.imread(io.BytesIO(drawn[name]), format="png")[:, :, :3]
@@ -43,9 +45,25 @@ def test_the_deviation_picture_shows_the_bend_in_red(drawn: dict[str, bytes]) ->
 def test_a_failing_renderer_leaves_the_curves_and_a_finding(job, monkeypatch) -> None:
     monkeypatch.setattr(scenes, "_CHILD", "no_such_module_anywhere")
     found, findings = pictures(job.mesh, job.scan, job.registration, None, None, 0.5)
-    assert set(found) == {"error_1.png", "correction_1.png"}
+    assert set(found) == {"error_1.png", "uncertainty_1.png", "correction_1.png"}
     assert [finding.code for finding in findings] == [PICTURES_FAILED]
     assert "renderer failed" in findings[0].message
+
+
+def test_a_contour_without_uncertainty_has_no_picture_of_it(job, monkeypatch) -> None:
+    monkeypatch.setattr(scenes, "_CHILD", "no_such_module_anywhere")
+    silent = replace(job.registration, contours=(job.with_contour(normal_u_mm=None, out_u_mm=None),))
+    found, _ = pictures(job.mesh, job.scan, silent, None, None, 0.5)
+    assert set(found) == {"error_1.png", "correction_1.png"}
+
+
+def test_the_report_says_how_sure_the_contour_is_after_how_well_it_fits(result) -> None:
+    titles = [table.title for table in document(result, {}, job="x").tables]
+    assert titles[:4] == ["Inputs", "Residuals of the scan", "How sure the corrected contour is", "Gates"]
+    made = document(result, {"uncertainty_1.png": b"", "deviation.png": b"", "error_1.png": b""}, job="x")
+    captions = [picture.caption for picture in made.pictures]
+    assert captions[1].startswith("Contour 1: how sure the corrected contour is. Band: 1.96 stated standard")
+    assert captions[0].startswith("Contour 1: distance between")
 
 
 def test_document_puts_pictures_in_reading_order(result) -> None:

@@ -6,21 +6,27 @@ import matplotlib
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from sicp_cam.report import figures
 from sicp_cam.report.figures import (
     AFTER,
+    BAND_MEANS,
     BEFORE,
     GAP,
     INTO,
     OUT,
     SEGMENT_STEPS,
+    SURE,
     TURN,
     correction_along_contour,
     error_along_contour,
+    uncertainty_along_contour,
 )
 from sicp_cam.report.result_tables import FIT
 
@@ -39,8 +45,8 @@ def error_png(job) -> bytes:
     return error_along_contour(job.contour, "sicp", 0.5)
 
 
-def test_error_shows_both_curves_and_the_gaps(job, error_png: bytes) -> None:
-    png = error_png
+def test_error_shows_both_curves_and_the_gaps(job) -> None:
+    png = error_along_contour(job.with_contour(normal_u_mm=None, out_u_mm=None), "sicp", 0.5)
     picture = pixels(png)
     assert picture.shape == (1130, 1600, 3)
     assert len(np.unique(picture.reshape(-1, 3) @ [65536, 256, 1])) > 100
@@ -74,18 +80,71 @@ def test_correction_shows_its_three_curves(job) -> None:
     assert correction_along_contour(still) != png
 
 
-def words(monkeypatch, draw) -> list[str]:
-    """Return all texts of the figure that `draw` makes."""
-    seen: list[str] = []
+def drawn(monkeypatch, draw) -> Figure:
+    """Return the figure that `draw` makes."""
+    seen: list[Figure] = []
 
     def read(canvas: FigureCanvasAgg) -> bytes:
-        seen.extend(text.get_text() for text in canvas.figure.findobj(Text) if text.get_text())
+        seen.append(canvas.figure)
         return b""
 
     with monkeypatch.context() as patch:
         patch.setattr(figures, "png", read)
         draw()
-    return seen
+    return seen[0]
+
+
+def words(monkeypatch, draw) -> list[str]:
+    """Return all texts of the figure that `draw` makes."""
+    return [text.get_text() for text in drawn(monkeypatch, draw).findobj(Text) if text.get_text()]
+
+
+def band(panel: Axes, s_mm: float) -> tuple[float, float]:
+    """Return the lower and the upper end of the band that is drawn in a panel, at one arc length."""
+    (fill,) = [each for each in panel.collections if isinstance(each, FillBetweenPolyCollection)]
+    s, y = fill.get_paths()[0].vertices.T
+    near = np.abs(s - s_mm) < 1.5
+    return float(y[near].min()), float(y[near].max())
+
+
+def test_the_band_is_95_percent_about_the_contour_and_goes_on_through_the_gaps(job, monkeypatch) -> None:
+    """The made contour states 0.1 mm across the edge, 0.4 mm in its gaps, and 0.02 mm out of the surface."""
+    seen, gap = job.contour.nominal.s_mm[150], job.contour.nominal.s_mm[50]
+    for draw, first in (
+        (lambda: error_along_contour(job.contour, "sicp"), 1),
+        (lambda: uncertainty_along_contour(job.contour, "sicp"), 0),
+    ):
+        panels = drawn(monkeypatch, draw).axes
+        assert band(panels[first], seen) == pytest.approx((-0.196, 0.196))
+        assert band(panels[first], gap) == pytest.approx((-0.784, 0.784))
+        assert band(panels[first + 1], seen) == pytest.approx((-0.0392, 0.0392))
+
+
+def test_the_band_of_a_loop_ends_where_it_began(job, monkeypatch) -> None:
+    u_mm = np.linspace(0.1, 0.2, len(job.contour.covered))
+    contour = job.with_contour(normal_u_mm=u_mm)
+    panel = drawn(monkeypatch, lambda: uncertainty_along_contour(contour, "sicp")).axes[0]
+    assert band(panel, contour.nominal.length_mm) == pytest.approx((-1.96 * 0.1, 1.96 * 0.1)), "as at its beginning"
+    assert band(panel, contour.nominal.s_mm[-1])[1] == pytest.approx(1.96 * 0.2)
+
+
+def test_the_uncertainty_shows_residuals_band_and_gaps_and_says_what_the_band_is(job, monkeypatch) -> None:
+    png = uncertainty_along_contour(job.contour, "sicp")
+    assert pixels(png).shape == (850, 1600, 3)
+    assert count(png, AFTER) > 1000 and count(png, SURE) > 20_000 and count(png, GAP) > 10_000
+    assert count(png, BEFORE) == 0
+    found = words(monkeypatch, lambda: uncertainty_along_contour(job.with_contour(number=10), "sicp"))
+    assert {"Contour 10: how sure the corrected contour is", BAND_MEANS, "S-ICP (sicp)"} <= set(found)
+    assert "95 % of the true edge should lie in it" in BAND_MEANS
+
+
+def test_a_method_that_states_no_uncertainty_has_no_band(job, monkeypatch) -> None:
+    silent = job.with_contour(normal_u_mm=None, out_u_mm=None)
+    assert count(error_along_contour(silent, "paper", 0.5), SURE) == 0
+    key = "95 % band of the corrected contour"
+    assert count(error_along_contour(job.contour, "sicp", 0.5), SURE) > 1000
+    assert key not in words(monkeypatch, lambda: error_along_contour(silent, "paper"))
+    assert key in words(monkeypatch, lambda: error_along_contour(job.contour, "sicp"))
 
 
 @pytest.mark.parametrize(

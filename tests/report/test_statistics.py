@@ -5,8 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sicp_cam.registration.result import Residuals
-from sicp_cam.report.statistics import all_contours, both, residual_summary, share_within, summary
+from sicp_cam.registration.result import LeaveOut, Residuals
+from sicp_cam.report.statistics import (
+    all_contours,
+    both,
+    leave_out_summary,
+    residual_summary,
+    share_within,
+    summary,
+    uncertainty_summary,
+)
 
 numbers = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=50)
 
@@ -75,3 +83,74 @@ def test_contours_are_joined_in_order(job) -> None:
 def test_no_contours_give_empty_arrays() -> None:
     before, _, covered = all_contours(())
     assert residual_summary(before, covered) == {"normal": None, "out": None, "both": None}
+
+
+def stating(job, normal, out, covered=None, leave_out=None):
+    """Return the contour of the job with an uncertainty at a few stations."""
+    seen = np.ones(len(normal), bool) if covered is None else np.array(covered, bool)
+    u = {"normal_u_mm": np.array(normal, float), "out_u_mm": np.array(out, float)}
+    return job.with_contour(covered=seen, leave_out=leave_out, **u)
+
+
+def spread(mean: float, largest: float) -> dict[str, float]:
+    return pytest.approx({"mean_mm": mean, "max_mm": largest})
+
+
+def test_the_uncertainty_is_told_where_the_scan_shows_the_edge_and_in_gaps(job) -> None:
+    found = uncertainty_summary([stating(job, [3.0, 6.0, 30.0], [4.0, 8.0, 40.0], [1, 1, 0])])
+    assert found is not None
+    bridged = found.pop("bridged")
+    parts = {"normal": spread(4.5, 6.0), "out": spread(6.0, 8.0)}
+    assert {name: found.pop(name) for name in parts} == parts
+    assert found == spread(7.5, 10.0)
+    assert {name: bridged.pop(name) for name in parts} == {"normal": spread(30.0, 30.0), "out": spread(40.0, 40.0)}
+    assert bridged == spread(50.0, 50.0)
+
+
+def test_the_largest_uncertainty_is_that_of_one_place_not_of_two(job) -> None:
+    found = uncertainty_summary([stating(job, [3.0, 4.0], [4.0, 3.0])])
+    assert found is not None
+    assert (found["max_mm"], found["bridged"]) == (pytest.approx(5.0), None)
+
+
+def test_all_contours_count_for_the_uncertainty(job) -> None:
+    one, other = stating(job, [1.0, 1.0], [0.0, 0.0], [1, 0]), stating(job, [2.0], [0.0])
+    found = uncertainty_summary([one, other])
+    assert found is not None
+    assert (found["mean_mm"], found["max_mm"], found["bridged"]["max_mm"]) == (1.5, 2.0, 1.0)
+
+
+def test_a_contour_that_states_none_leaves_all_without(job) -> None:
+    silent = job.with_contour(normal_u_mm=None, out_u_mm=None, leave_out=None)
+    assert uncertainty_summary([silent]) is None
+    assert uncertainty_summary([job.contour, silent]) is None
+    assert leave_out_summary([silent]) is None
+    assert leave_out_summary([job.contour, silent]) is None
+    assert uncertainty_summary([]) is None and leave_out_summary([]) is None
+
+
+@pytest.mark.parametrize("unknown", [np.nan, np.inf])
+def test_one_value_that_is_not_known_may_be_the_largest(job, unknown: float) -> None:
+    found = uncertainty_summary([stating(job, [1.0, unknown], [1.0, 1.0])])
+    assert found is not None
+    assert (found["mean_mm"], found["max_mm"], found["normal"]["max_mm"], found["out"]["max_mm"]) == (
+        None,
+        None,
+        None,
+        1,
+    )
+    assert leave_out_summary([stating(job, [1.0], [1.0], leave_out=LeaveOut(unknown, 0.0))]) == dict.fromkeys(
+        ("normal", "out", "both")
+    )
+
+
+def test_a_contour_that_the_scan_does_not_show_has_no_uncertainty_but_that_of_its_gap(job) -> None:
+    found = uncertainty_summary([stating(job, [3.0], [4.0], [0])])
+    assert found is not None
+    assert (found["mean_mm"], found["max_mm"], found["bridged"]["max_mm"]) == (None, None, 5.0)
+
+
+def test_leave_out_is_that_of_the_worst_contour(job) -> None:
+    small, large = LeaveOut(0.5, 0.0), LeaveOut(0.3, 0.6)
+    found = leave_out_summary([stating(job, [1.0], [1.0], leave_out=halves) for halves in (small, large, small)])
+    assert found == {"normal": 0.3, "out": 0.6, "both": pytest.approx(np.hypot(0.3, 0.6))}
