@@ -14,25 +14,37 @@ from sicp_cam.contour.choice import Assignment, assign
 from sicp_cam.contour.frames import at, framed
 from sicp_cam.contour.mesh_contours import mesh_contours
 from sicp_cam.contour.projection import nearest
-from sicp_cam.errors import InputError, JobError, PathError, UnitError
+from sicp_cam.errors import InputError, JobError, PathError, RegistrationError, UnitError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import BoolArray, Contour, FloatArray, Part, Scan, ToolPath
 from sicp_cam.registration.register import register_contours
 from sicp_cam.registration.result import Registration
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
-from sicp_cam.rigid_motion import is_rigid
+from sicp_cam.registration.start import congruent
+from sicp_cam.rigid_motion import apply, is_rigid
 from sicp_cam.toolpath.settings import GateLimits, ToolPathSettings
 from sicp_cam.toolpath.steps import Steps, divided, feed_steps
 from sicp_cam.toolpath.transfer import CorrectedPath, correct_path
 from sicp_cam.units import MM_PER_UNIT
 
-__all__ = ["PartRegistration", "check_scan_unit", "choice_findings", "choose_contours", "contours_of", "register"]
+__all__ = [
+    "PartRegistration",
+    "check_scan_unit",
+    "choice_findings",
+    "choose_contours",
+    "contours_of",
+    "refuse_twins",
+    "register",
+]
 
 STEP_MM = 2.0
 CLEARLY_WORSE = 0.3
 """Logarithm of a size ratio by which a unit must fit worse than the best one not to be named."""
 INTO_THE_PART = -0.2
 """Cosine of tool axis and outward normal below which a tool would come through the skin."""
+TWIN_SHARE, TWIN_WAY = 0.1, 0.4
+"""Distance of two contours of one shape, over their diagonal, beyond which they are two places of the part, and how far
+over that distance a start pose may be off."""
 OTHER_SKIN_MM = 1.0
 """How much nearer another contour must be to be worth a warning."""
 
@@ -227,6 +239,51 @@ def check_scan_unit(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> 
         )
 
 
+def refuse_twins(
+    contours: Sequence[Contour], chosen: Mapping[int, Contour], T_start: FloatArray | None, T_found: FloatArray | None
+) -> None:
+    """Refuse a pose that may lie on another place of the part with the same contour, which is not registered.
+
+    Without a start there is nothing to tell such twins by; with one, a way of nearly half their distance is too long.
+
+    Parameters
+    ----------
+    contours
+        All contours of the part.
+    chosen
+        Those that are registered, by number.
+    T_start, T_found
+        (4, 4) start pose T_scan_part, and the registered one; None before either is known.
+
+    Raises
+    ------
+    RegistrationError
+        Naming the two contours.
+    """
+    others = {number: framed(c) for number, c in enumerate(contours, 1) if number not in chosen}
+    for number, contour in chosen.items():
+        own = framed(contour)
+        middle = own.points_mm.mean(axis=0)
+        for twin, other in others.items():
+            apart_mm = float(np.linalg.norm(middle - other.points_mm.mean(axis=0)))
+            # Nearer is the edge of the same hole on the other skin.
+            if apart_mm <= TWIN_SHARE * _diagonal(own.points_mm) or not congruent(own, other):
+                continue
+            if T_start is None:
+                raise RegistrationError(
+                    f"contours {number} and {twin} have one shape, {apart_mm:.0f} mm apart: which of them the scan"
+                    " shows cannot be told; give a rough pose or datum pairs with --align FILE"
+                )
+            way_mm = 0.0
+            if T_found is not None:
+                way_mm = float(np.linalg.norm(apply(T_found, middle[None]) - apply(T_start, middle[None])))
+            if way_mm > TWIN_WAY * apart_mm:
+                raise RegistrationError(
+                    f"contour {number} was found {way_mm:.1f} mm from where the start pose has it, and contour {twin}"
+                    f" of the same shape lies {apart_mm:.1f} mm from it: give a better start pose (--align FILE)"
+                )
+
+
 def _diagonal(points_mm: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points_mm, axis=0))) if len(points_mm) else 0.0
 
@@ -276,5 +333,7 @@ def register(
     gates = gates or GateLimits()
     chosen = choose_contours(contours_of(part), path, contours, gates.path_distance_mm)
     check_scan_unit(scan, part, chosen)
+    refuse_twins(contours_of(part), chosen, align, None)
     result = register_contours(chosen, scan, align, method=method, settings=settings)
+    refuse_twins(contours_of(part), chosen, result.T_scan_part if align is None else align, result.T_scan_part)
     return PartRegistration(result, toolpath or ToolPathSettings(), gates)

@@ -16,7 +16,14 @@ import numpy as np
 from sicp_cam import output, plugins
 from sicp_cam.alignment import read_alignment
 from sicp_cam.beside import beside
-from sicp_cam.correction import PartRegistration, check_scan_unit, choice_findings, choose_contours, contours_of
+from sicp_cam.correction import (
+    PartRegistration,
+    check_scan_unit,
+    choice_findings,
+    choose_contours,
+    contours_of,
+    refuse_twins,
+)
 from sicp_cam.errors import InputError, PathError, RegistrationError, WarningsError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
@@ -146,7 +153,10 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
         noticed += choice_findings(contours_of(inputs.part), chosen, inputs.path)
         check_scan_unit(inputs.scan, inputs.part, chosen)
     with clock.step("register", 0.3):
+        refuse_twins(contours_of(inputs.part), chosen, T_start, None)
         result = register_contours(chosen, inputs.scan, T_start, method=job.method, settings=job.registration)
+        T_from = result.T_scan_part if T_start is None else T_start
+        refuse_twins(contours_of(inputs.part), chosen, T_from, result.T_scan_part)
         registration = PartRegistration(result, job.toolpath, job.gates)
         gates = overridden(registration_gates(result, job.gates, T_start), job.override)
         _refuse(gates, RegistrationError)

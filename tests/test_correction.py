@@ -205,7 +205,8 @@ def sagged(synthetic):
     bent = synthetic.bent(sheet, sagging)
     scan = synthetic.scan(synthetic.material([outline], spacing_mm=2.5, depth_mm=45.0), bent, noise_mm=0.03, pose=POSE)
     contour = synthetic.contour(outline, sheet)
-    other = Contour(contour.points_mm + np.array([2000.0, 0.0, 0.0]), contour.tangents, contour.normals)
+    other = synthetic.contour(synthetic.oval(140.0, 60.0), sheet)
+    other = Contour(other.points_mm + np.array([2000.0, 0.0, 0.0]), other.tangents, other.normals)
     true = synthetic.contour(outline, bent, rings_mm=())
     moved = Contour(apply(POSE, true.points_mm), rotate(POSE, true.tangents), rotate(POSE, true.normals))
     return Part((other, contour), square()), scan, moved

@@ -33,9 +33,9 @@ PROBES = (((0.5, 1.25, 2.0), 2), ((3.5, 5.0, 6.5), 1))
 """Depths behind the rim at which the surface is looked for, in point spacings, and at how many it must be found."""
 PROBE_RADIUS_SPACINGS = 1.2
 BEFORE_RIM_SPACINGS = 3.0
-ROWS_WIDTH_SPACINGS, ROWS_DEPTH_SPACINGS, ROWS_SLICE_SPACINGS = 8.0, 3.0, 0.1
-EMPTY_SLICE, ROW_GAP_SPACINGS = 0.1, 0.5
-"""Density over the interior's below which a slice is empty, and the width of empty strips that means rows."""
+ROWS_WIDTH_SPACINGS, ROWS_DEPTH_SPACINGS, ROWS_SLICE_SPACINGS = 10.0, 3.0, 0.1
+EMPTY_SLICE, STRIP_SPACINGS = 0.1, 0.3
+"""Density over the interior's below which a slice is empty, and the width of empty strips that chance does not make."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,7 +187,7 @@ def row_gap_mm(
     # In a gap of the scan there is nothing at all: that is another matter.
     seen = smoothed((per_mm > 0.0).astype(np.float64), stations, curve, width_mm)
     whole = smoothed(np.ones(len(stations)), stations, curve, width_mm)
-    return np.where((per_mm > 0.0) & (seen > 0.5 * whole) & (widest > ROW_GAP_SPACINGS * spacing_mm), widest, 0.0)
+    return np.where((per_mm > 0.0) & (seen > 0.5 * whole) & (widest >= 0.99 * STRIP_SPACINGS * spacing_mm), widest, 0.0)
 
 
 def _turn_in_surface(curve: FramedCurve, stations: FloatArray) -> FloatArray:

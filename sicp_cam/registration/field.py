@@ -10,7 +10,7 @@ sigma being the noise of a point and r the density at the rim over that of the i
 coefficients c of w makes this the minimum of a convex function; scaled by eta = sum psi / sum psi^2, so that its
 curvature is the inverse of the scatter that the equations have for points at random, the field minimises
 
-    eta [sum psi(x_i) + r k integral rho w . B ds] + 1/2 stiffness integral |w''|^2 ds
+    eta [sum psi(x_i) - r k integral rho w . B ds] + 1/2 stiffness integral |w''|^2 ds
 
 by Newton steps. The stiffness is the one of largest marginal likelihood (Laplace's approximation; Wood 2011): the data
 choose over what length the edge is averaged. The smaller tau is, the fewer points settle the edge and the less the
@@ -51,8 +51,8 @@ RIM_DENSITY = (0.8, 2.5)
 RIM_ROUNDS = 4
 DENSITY_DOUBT = 0.3
 """Standard uncertainty of the logarithm of the rim's density over samplings; the edge is in doubt by tau times that."""
-STIFFNESS = 1e6
-"""Stiffness of the fit that the first look at the points takes."""
+STIFFNESS, LEAST_STIFFNESS = 1e6, 1e3
+"""Stiffness of the fit that the first look at the points takes, and the least, both for a contour a metre long."""
 DISPLACEMENT_SHARE, LARGE, RARE = 0.01, 5e-4, 0.01
 """A field of a given stiffness moves about 0.01 length^1.5 / stiffness^0.5. More than 1 / 2000 of the length is as
 rare as 1 in 100, for a part that bends keeps its lengths: a prior of the stiffness (Simpson et al. 2017) that it takes
@@ -120,8 +120,10 @@ class EdgeFit:
     def uncertainty_mm(self, rows: LocalRows) -> FloatArray:
         """Return the standard uncertainty of w . B for n rows: of the points' scatter and of their density."""
         dense = rows.dense()
-        spread = cho_solve(cho_factor(self.information), dense.T)
-        return np.asarray(np.sqrt(np.einsum("ij,ji->i", dense, spread) + (DENSITY_DOUBT * self.decay_mm) ** 2))
+        spread = np.einsum("ij,ji->i", dense, cho_solve(cho_factor(self.information), dense.T))
+        # Where few points lie within tau, the logarithm of their moment has a longer tail than its curvature says.
+        spread = spread * (1.0 + spread / self.decay_mm**2)
+        return np.asarray(np.sqrt(spread + (DENSITY_DOUBT * self.decay_mm) ** 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,7 +170,7 @@ def fit_to_edge(space: InSurface, points: EdgePoints, *, rough: bool = False) ->
     depth, expected = points.depth_mm + before, space.rows(points.stations_mm).summed(points.per_mm)
     shown, total = space.rows(points.stations_mm[points.per_mm > 0.0]), float(points.per_mm.sum())
     c, ratio = _near_rim(rows, points.rim_mm + before, space, points), 1.0
-    stiffness: float | None = None
+    stiffness, first = None, STIFFNESS * space.curve.length_mm / 1e3
     decays = DECAYS_SPACINGS[:-1] if rough else DECAYS_SPACINGS
     for number, decay in enumerate(decays):
         tau = max(decay * points.spacing_mm, LEAST_DECAY_NOISE * points.noise_mm)
@@ -176,11 +178,11 @@ def fit_to_edge(space: InSurface, points: EdgePoints, *, rough: bool = False) ->
         near = (behind > -BEFORE_EDGE_DECAYS * tau) & (behind < BEHIND_EDGE_DECAYS * tau)
         stray = _stray_density(behind, points, total)
         stage = _Stage(rows.taken(near), depth[near], expected, space, points, tau, stray)
-        c = _newton(stage, ratio, c, stiffness or STIFFNESS).coefficients
+        c = _newton(stage, ratio, c, stiffness or first).coefficients
         stage = replace(stage, weight=_weight(stage, c))
         # A stage between the first and the last only brings the points nearer.
         settles = number in (0, len(decays) - 1)
-        found = _likeliest(stage, ratio, c) if settles else _newton(stage, ratio, c, stiffness or STIFFNESS)
+        found = _likeliest(stage, ratio, c) if settles else _newton(stage, ratio, c, stiffness or first)
         c, stiffness = found.coefficients, found.stiffness
         # Half of the points find the edge with twice the variance.
         blur = float(np.sqrt(points.noise_mm**2 + 2.0 * _mean_variance(found, shown)))
@@ -194,8 +196,9 @@ def fit_to_edge(space: InSurface, points: EdgePoints, *, rough: bool = False) ->
 def _near_rim(rows: LocalRows, rim_mm: FloatArray, space: InSurface, points: EdgePoints) -> FloatArray:
     """Return the coefficients of a field that runs along the scan's rim."""
     hold = _hold(space, points)
-    A = rows.gram(np.ones(len(rim_mm))) + FIRST_STIFFNESS * space.rough + np.diag(hold)
-    return np.asarray(cho_solve(cho_factor(A), rows.summed(rim_mm) + hold * space.moved))
+    stiffness = FIRST_STIFFNESS * space.curve.length_mm / 1e3 / points.spacing_mm**2
+    A = rows.gram(np.ones(len(rim_mm)) / points.spacing_mm**2) + stiffness * space.rough + np.diag(hold)
+    return np.asarray(cho_solve(cho_factor(A), rows.summed(rim_mm / points.spacing_mm**2) + hold * space.moved))
 
 
 def _hold(space: InSurface, points: EdgePoints) -> FloatArray:
@@ -274,7 +277,7 @@ def _likeliest(stage: _Stage, ratio: float, start: FloatArray) -> _Solution:
         free = float(0.5 * stage.space.bends * np.log(stiffness))
         return float(free + prior - solution.cost - half_determinant)
 
-    return tried[most_likely(evidence, least=stage.space.curve.length_mm)]
+    return tried[most_likely(evidence, least=LEAST_STIFFNESS, unit=stage.space.curve.length_mm / 1e3)]
 
 
 def _newton(stage: _Stage, ratio: float, start: FloatArray, stiffness: float) -> _Solution:

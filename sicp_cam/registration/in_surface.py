@@ -84,7 +84,10 @@ def in_surface(splines: CurveSplines, curve: FramedCurve, rigid: FramedCurve) ->
     bend = np.hstack([D, D])[:, :, None] * axes  # (m, 2 K, 3)
     bend -= np.einsum("mki,mi->mk", bend, middle)[:, :, None] * middle[:, None, :]
     flat = bend.transpose(0, 2, 1).reshape(-1, len(axes))
-    motions = _rigid_motions(np.tile(knots.points_mm, (2, 1)), axes)
+    # The outermost knots of an open curve lie beyond its ends, on its tangent.
+    beyond = 0.0 if splines.closed else splines.centres_mm - np.clip(splines.centres_mm, 0.0, splines.length_mm)
+    places = knots.points_mm + np.multiply(beyond, knots.tangents.T).T
+    motions = _rigid_motions(np.tile(places, (2, 1)), axes)
     flat = flat - (flat @ motions) @ motions.T
     slides = np.repeat([0.0, 1.0], len(splines))
     change = np.tile(knots.points_mm - at(rigid, splines.centres_mm).points_mm, (2, 1))

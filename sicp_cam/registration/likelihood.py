@@ -10,7 +10,9 @@ COARSE, FINE = 10.0**1.5, 10.0**0.5
 MOST = 1e10
 
 
-def most_likely(evidence: Callable[[float], float], *, start: float | None = None, least: float = 1.0) -> float:
+def most_likely(
+    evidence: Callable[[float], float], *, start: float | None = None, least: float = 1.0, unit: float = 1.0
+) -> float:
     """Return the stiffness of largest evidence.
 
     Parameters
@@ -20,7 +22,9 @@ def most_likely(evidence: Callable[[float], float], *, start: float | None = Non
     start
         Where to begin; None looks at coarse steps from `MOST` down to `least` first, for there may be several maxima.
     least
-        Least stiffness that is tried.
+        Least stiffness that is tried, in units.
+    unit
+        What stiffnesses are counted in: a part twice as large has its stiffness twice as large.
     """
     tried: dict[float, float] = {}
 
@@ -29,9 +33,9 @@ def most_likely(evidence: Callable[[float], float], *, start: float | None = Non
             tried[stiffness] = evidence(stiffness)
         return tried[stiffness]
 
-    steps = [MOST / COARSE**k for k in range(20) if MOST / COARSE**k >= least] or [least]
+    steps = [unit * MOST / COARSE**k for k in range(20) if MOST / COARSE**k >= least] or [unit * least]
     best = start if start is not None else max(steps, key=value)
     for factor in (FINE, 1.0 / FINE):
-        while least <= best * factor <= MOST * 1.001 and value(best * factor) > value(best):
+        while least <= best * factor / unit <= MOST * 1.001 and value(best * factor) > value(best):
             best *= factor
     return best

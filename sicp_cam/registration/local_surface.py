@@ -32,7 +32,7 @@ DEPTH_SPACINGS, LEAST_DEPTH_MM = 10.0, 6.0
 """Depth of the band of scan points that the surface is fitted to; of a fine scan it is as deep as its slope needs."""
 OUTSIDE_SPACINGS = 2.0
 ROUNDS = 3
-ROBUST = 4.7
+ROBUST, FIRST_ROBUST = 4.7, 15.0
 SHAPE_DOUBT = 0.1
 """Standard uncertainty that the quadratic itself adds, over the noise: a scan bends in more ways than it can follow."""
 LEAST_NOISE_MM = 1e-4
@@ -118,18 +118,23 @@ def fit_surface(
     D = splines.second_differences()
     rough = np.array(np.kron(np.eye(3), D.T @ D), dtype=np.float64)
     free = 3 * len(D)
-    trust, noise_mm = np.ones(len(v)), max(float(np.std(v)) if len(v) else 0.0, LEAST_NOISE_MM)
+    # The wall of a cut-out, where it was scanned, stands at the rim: the first look is at what lies behind it.
+    trust = (g * band_mm > spacing_mm).astype(np.float64)
+    noise_mm = max(float(np.std(v)) if len(v) else 0.0, LEAST_NOISE_MM)
     stiffness = 1.0
     for turn in range(ROUNDS):
         weight = trust / noise_mm**2
         N, right = rows.gram(weight) + RIDGE * np.eye(rows.size), rows.summed(weight * v)
         if turn < ROUNDS - 1:
-            stiffness = most_likely(partial(_evidence, N, right, rough, free), start=stiffness if turn else None)
+            evidence = partial(_evidence, N, right, rough, free)
+            unit = splines.length_mm / 1e3
+            stiffness = most_likely(evidence, start=stiffness if turn else None, unit=unit)
         A = N + stiffness * rough
         fit = np.asarray(cho_solve(cho_factor(A), right))
         residual = v - rows.times(fit)
-        noise_mm = max(float(1.4826 * np.median(np.abs(residual))) if len(v) else 0.0, LEAST_NOISE_MM)
-        trust = tukey(residual, ROBUST * noise_mm)
+        judged = residual[trust > 0.0] if turn == 0 else residual
+        noise_mm = max(float(1.4826 * np.median(np.abs(judged))) if len(judged) else 0.0, LEAST_NOISE_MM)
+        trust = tukey(residual, (FIRST_ROBUST if turn == 0 else ROBUST) * noise_mm)
     half = weight * (np.arange(len(v)) % 2)
     of_half = rows.gram(half) + 0.5 * RIDGE * np.eye(rows.size), rows.summed(half * v)
     of_rest = N - of_half[0], right - of_half[1]

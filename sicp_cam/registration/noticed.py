@@ -20,6 +20,7 @@ SHOWN_SHARE = 0.9
 UNSURE_SIDE = 0.67
 """Misfit of the pose over that of the part turned over above which the scan does not tell the side."""
 WEAK_FREEDOM = 0.05
+ROW_GAP_SPACINGS = 0.5
 
 
 def noticed(
@@ -44,7 +45,7 @@ def noticed(
     """
     found = list(_of_freedoms(pose))
     for contour, measured in done:
-        found += _of_contour(contour, measured)
+        found += _of_contour(contour, measured, surface.spacing_mm)
     if surface.in_rows:
         text = (
             "the points of the scan lie in rows, much denser along them than across: near the contour they were thinned"
@@ -73,7 +74,7 @@ def _of_freedoms(pose: RigidPose) -> Iterator[Finding]:
             yield Finding(401, Level.INFO, text)
 
 
-def _of_contour(contour: RegisteredContour, measured: EdgeMeasurement) -> Iterator[Finding]:
+def _of_contour(contour: RegisteredContour, measured: EdgeMeasurement, spacing_mm: float) -> Iterator[Finding]:
     where = f"contour {contour.number}"
     if contour.uncut:
         text = (
@@ -85,7 +86,7 @@ def _of_contour(contour: RegisteredContour, measured: EdgeMeasurement) -> Iterat
     if share < 1.0:
         text = f"the scan shows {100.0 * share:.1f} % of the edge; the rest is carried over from both sides"
         yield Finding(402, Level.INFO if share >= SHOWN_SHARE else Level.WARN, text, where)
-    in_rows = measured.row_gap_mm > 0.0
+    in_rows = measured.row_gap_mm > ROW_GAP_SPACINGS * spacing_mm
     if in_rows.any():
         length_mm = in_rows.mean() * contour.nominal.length_mm
         text = (

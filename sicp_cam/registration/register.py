@@ -68,12 +68,13 @@ def register_contours(
         whole = prepared(_enough(scan, settings))
         start = find_start(list(nominal.values()), whole, reach_mm=settings.reach_mm)
         T_start, symmetry = start.T_scan_part, start.symmetry
-    surface, pose = _rigid(list(nominal.values()), scan, T_start, settings)
+    surface, pose, uncut = _rigid(list(nominal.values()), scan, T_start, settings)
     side = None
     if symmetry is None:
         side = side_ratio(list(nominal.values()), surface, pose.T_scan_part, reach_mm=settings.reach_mm)
     done = [
-        _registered_contour(number, contour, surface, pose, method, settings) for number, contour in nominal.items()
+        _registered_contour(number, contour, surface, pose, method, settings, at_start)
+        for (number, contour), at_start in zip(nominal.items(), uncut, strict=True)
     ]
     registered = tuple(contour for contour, _ in done)
     return Registration(
@@ -102,14 +103,15 @@ def _check(contours: Mapping[int, Contour], T_start: FloatArray | None, method: 
 
 def _rigid(
     contours: list[NominalContour], scan: Scan, T_start: FloatArray, settings: RegistrationSettings
-) -> tuple[ScanSurface, RigidPose]:
+) -> tuple[ScanSurface, RigidPose, list[bool]]:
     """Register rigidly to the scan around the contours; again where the pose left the part of the scan looked at."""
     T = T_start
     for _ in range(MOST_CROPS):
         near = [moved(contour.curve, T) for contour in contours]
         surface = prepared(_enough(cropped(scan, near, CROP_MARGIN * settings.reach_mm), settings))
-        solid = all(is_uncut(contour, surface, T, settings.reach_mm) for contour in contours)
-        pose = (register_to_surface if solid else register_rigidly)(contours, surface, T, reach_mm=settings.reach_mm)
+        uncut = [is_uncut(contour, surface, T, settings.reach_mm) for contour in contours]
+        register_part = register_to_surface if all(uncut) else register_rigidly
+        pose = register_part(contours, surface, T, reach_mm=settings.reach_mm)
         after = [moved(contour.curve, pose.T_scan_part) for contour in contours]
         shift = max(
             float(np.linalg.norm(a.points_mm - b.points_mm, axis=1).max()) for a, b in zip(near, after, strict=True)
@@ -117,7 +119,7 @@ def _rigid(
         if shift <= RECROP_SHARE * settings.reach_mm:
             break
         T = pose.T_scan_part
-    return surface, pose
+    return surface, pose, uncut
 
 
 def _enough(scan: Scan, settings: RegistrationSettings) -> Scan:
@@ -137,9 +139,14 @@ def _registered_contour(
     pose: RigidPose,
     method: str,
     settings: RegistrationSettings,
+    uncut_at_start: bool,
 ) -> tuple[RegisteredContour, EdgeMeasurement]:
     rigid = moved(contour.curve, pose.T_scan_part)
     uncut = is_uncut(contour, surface, pose.T_scan_part, settings.reach_mm)
+    if uncut and not uncut_at_start:
+        raise RegistrationError(
+            f"contour {number} slid off its edge onto the surface; give a better start pose (--align)"
+        )
     if uncut and method not in ("sicp", "rigid"):
         raise RegistrationError(
             f"contour {number} is not cut yet, and the method {method} needs its edge; use --method sicp or rigid"

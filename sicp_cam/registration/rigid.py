@@ -29,6 +29,7 @@ CONVERGED_MM = 1e-3
 PRIOR = 1e-3
 RING_SHARE = 0.5
 """Weight of all stability points together over the weight of all rim points together."""
+OWN_WIDTHS, OWN_SPACINGS = 2.0 / 3.0, 3.0
 FACING = 0.3
 """Least cosine between a rim point's open side and the contour's own open side."""
 MIN_RIM_POINTS = 20
@@ -158,7 +159,7 @@ def _equations(
     deviations: list[FloatArray] = []
     for contour in contours:
         curve = moved(contour.curve, T)
-        chosen, s_mm = facing_rim(surface.rim, curve, reach_mm)
+        chosen, s_mm = facing_rim(surface.rim, curve, min(reach_mm, _own_reach_mm(contour.curve, surface.spacing_mm)))
         if len(chosen):
             rows.extend(_rim_rows(surface.rim.points_mm[chosen], at(curve, s_mm), scale_mm, reach_mm))
             deviations.append(rows[-2].residuals_mm)
@@ -171,6 +172,15 @@ def _equations(
             " check that scan and part belong together and that the start pose (--align) is right"
         )
     return stacked(*rows), np.concatenate(deviations)
+
+
+def _own_reach_mm(curve: FramedCurve, spacing_mm: float) -> float:
+    """Return how far from a closed contour its rim may lie: beyond two thirds of its own width other holes begin."""
+    if not curve.closed:
+        return np.inf
+    centred = curve.points_mm - curve.points_mm.mean(axis=0)
+    _, _, axes = np.linalg.svd(centred, full_matrices=False)
+    return max(OWN_WIDTHS * float(np.ptp(centred @ axes[1])), OWN_SPACINGS * spacing_mm)
 
 
 def _rim_rows(points_mm: FloatArray, foot: FramedCurve, scale_mm: float, reach_mm: float) -> list[Rows]:

@@ -16,6 +16,8 @@ from sicp_cam.registration.evenness import evened
 __all__ = ["ScanSurface", "cropped", "distances_along_normal", "prepared", "without_copies"]
 
 NEAR = 4
+SAMPLE, COPY, COPIES_SHARE = 2000, 0.02, 0.02
+"""Points nearer than this share of the distance of their 8th neighbours are copies, if as many of a sample have one."""
 APART = 1.8
 """How much further than those of its neighbours the 4th neighbour of a stray point is."""
 
@@ -82,14 +84,25 @@ def _apart(planes: LocalPlanes) -> BoolArray:
 
 
 def without_copies(scan: Scan) -> Scan:
-    """Return a scan with every point once; copies would take the places of a point's neighbours. A mesh stays."""
-    if scan.faces is not None:
+    """Return a scan with every point once; copies would take the places of a point's neighbours. A mesh stays.
+
+    Points a small part of their spacing apart are copies too: exports of one scan that were merged differ by rounding.
+    """
+    if scan.faces is not None or len(scan.points_mm) <= 2 * NEAR:
         return scan
     _, first = np.unique(scan.points_mm, axis=0, return_index=True)
-    if len(first) == len(scan.points_mm):
+    kept = np.zeros(len(scan.points_mm), dtype=bool)
+    kept[first] = True
+    points = scan.points_mm[kept]
+    tree = cKDTree(points)
+    distance, _ = tree.query(points[:: max(1, len(points) // SAMPLE)], k=2 * NEAR + 1)
+    close_mm = COPY * float(np.median(distance[:, 2 * NEAR]))
+    if (distance[:, 1] < close_mm).mean() > COPIES_SHARE:
+        pairs = tree.query_pairs(close_mm, output_type="ndarray")
+        kept[np.flatnonzero(kept)[pairs.max(axis=1)]] = False
+    if kept.all():
         return scan
-    first = np.sort(first)
-    return Scan(scan.points_mm[first], None if scan.normals is None else scan.normals[first], None, scan.source)
+    return Scan(scan.points_mm[kept], None if scan.normals is None else scan.normals[kept], None, scan.source)
 
 
 def _spacing_mm(planes: LocalPlanes) -> float:

@@ -23,7 +23,16 @@ from sicp_cam.registration.rigid import NominalContour, register_rigidly, thinne
 from sicp_cam.registration.scan_surface import ScanSurface, distances_along_normal
 from sicp_cam.rigid_motion import apply, best_fit, from_parts, rotate
 
-__all__ = ["Start", "find_start", "is_circular", "is_symmetric", "scan_loops", "side_ratio", "signature_poses"]
+__all__ = [
+    "Start",
+    "congruent",
+    "find_start",
+    "is_circular",
+    "is_symmetric",
+    "scan_loops",
+    "side_ratio",
+    "signature_poses",
+]
 
 SIGNATURE_POINTS = 256
 LENGTH_TOLERANCE = 0.2
@@ -145,6 +154,15 @@ def is_symmetric(curve: FramedCurve) -> bool:
     far = slice(SIGNATURE_POINTS // 20, -(SIGNATURE_POINTS // 20))
     turned_over = _misfit_of_shifts(points, points[::-1]).min()
     return bool(min(_misfit_of_shifts(points, points)[far].min(), turned_over) < SELF_MISFIT * size)
+
+
+def congruent(a: FramedCurve, b: FramedCurve) -> bool:
+    """Say whether two closed contours have one shape, so that neither can be told from the other by it."""
+    if not (a.closed and b.closed) or abs(a.length_mm / b.length_mm - 1.0) > SELF_MISFIT:
+        return False
+    shapes = [at(c, np.arange(SIGNATURE_POINTS) * c.length_mm / SIGNATURE_POINTS).points_mm for c in (a, b)]
+    size = float(np.sqrt(np.mean(np.sum((shapes[0] - shapes[0].mean(axis=0)) ** 2, axis=1))))
+    return bool(min(_misfit_of_shifts(shapes[0], shapes[1][::sense]).min() for sense in (1, -1)) < SELF_MISFIT * size)
 
 
 def is_circular(nominal: FloatArray) -> bool:

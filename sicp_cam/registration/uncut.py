@@ -22,7 +22,9 @@ __all__ = ["is_uncut", "register_to_surface"]
 BESIDE_MM, BESIDE_SPACINGS, BESIDE_SIZE = 15.0, 5.0, 0.25
 """How far on both sides of the contour the surface is looked for: beyond the error of a start pose, but never further
 than a quarter of the contour's size, where an opening has another side."""
-THERE_SPACINGS = 1.5
+STEPS = (-1.0, -1.0 / 3.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
+"""Where, in shares of that: the last four in equal steps, so that a parabola through three tells the fourth."""
+THERE_SPACINGS, LEVEL_SPACINGS, LEVEL_SHARE = 1.5, 0.5, 0.9
 UNCUT_SHARE = 0.8
 """Share of the stations that must have the surface on both sides."""
 ITERATIONS = 30
@@ -33,14 +35,20 @@ def is_uncut(contour: NominalContour, surface: ScanSurface, T_scan_part: FloatAr
     """Say whether the scan goes on beyond a contour, on its open side as on the side of the material."""
     curve = moved(contour.curve, T_scan_part)
     beside_mm = min(max(BESIDE_MM, BESIDE_SPACINGS * surface.spacing_mm), BESIDE_SIZE * _size_mm(curve))
-    both = np.ones(len(curve), dtype=bool)
-    for depth_mm in (-beside_mm, -0.5 * beside_mm, beside_mm):
-        places = curve.points_mm + depth_mm * curve.inward
+    there, heights = np.ones(len(curve), dtype=bool), []
+    for depth in STEPS:
+        places = curve.points_mm + depth * beside_mm * curve.inward
         out, planes = distances_along_normal(surface, places, curve.outward, reach_mm)
         places = places + np.nan_to_num(out)[:, None] * planes
         near, _ = surface.tree.query(places, distance_upper_bound=THERE_SPACINGS * surface.spacing_mm)
-        both &= np.isfinite(out) & np.isfinite(near)
-    return float(both.mean()) > UNCUT_SHARE
+        there &= np.isfinite(out) & np.isfinite(near)
+        heights.append(out)
+    if float(there.mean()) <= UNCUT_SHARE:
+        return False
+    beyond, first, second, third = (height[there] for height in heights[-4:])
+    # What is seen through an opening, as a table, does not carry on the parabola through the material.
+    step = beyond - (6.0 * first - 8.0 * second + 3.0 * third)
+    return float((np.abs(step) < LEVEL_SPACINGS * surface.spacing_mm).mean()) > LEVEL_SHARE
 
 
 def _size_mm(curve: FramedCurve) -> float:

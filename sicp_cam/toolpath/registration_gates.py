@@ -70,7 +70,7 @@ def _expected(method: str, gate: Gate) -> Gate:
 
 def _confidence_gates(contours: Sequence[RegisteredContour], limits: GateLimits) -> tuple[Gate, ...]:
     """Judge how sure the contour is; a method that states no uncertainty or looks at no half scan has no such gate."""
-    halves = [_half_difference_mm(contour) for contour in contours]
+    halves = [_half_difference_mm(contour) for contour in contours if not contour.uncut]
     uncertainty = [_largest_uncertainty_mm(contour) for contour in contours]
     found = (
         ("leave_out_mm", halves, limits.leave_out_mm, "difference of the contours found from two halves of the scan"),
