@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -33,9 +34,9 @@ PROBES = (((0.5, 1.25, 2.0), 2), ((3.5, 5.0, 6.5), 1))
 """Depths behind the rim at which the surface is looked for, in point spacings, and at how many it must be found."""
 PROBE_RADIUS_SPACINGS = 1.2
 BEFORE_RIM_SPACINGS = 3.0
-ROWS_WIDTH_SPACINGS, ROWS_DEPTH_SPACINGS, ROWS_SLICE_SPACINGS = 10.0, 3.0, 0.1
-EMPTY_SLICE, STRIP_SPACINGS = 0.1, 0.3
-"""Density over the interior's below which a slice is empty, and the width of empty strips that chance does not make."""
+ROWS_DEPTH_SPACINGS, ROWS_SLICE_SPACINGS, EMPTY_SLICE = 3.0, 0.1, 0.1
+STRIPS_SPACINGS = ((10.0, 0.3), (4.0, 0.8))
+"""Windows along the edge, and the width of empty strips that chance does not make in each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,19 +176,21 @@ def row_gap_mm(
     per_mm
         (k,) points per mm of depth that the density of the interior puts about each station.
     """
-    width_mm, slices = ROWS_WIDTH_SPACINGS * spacing_mm, round(ROWS_DEPTH_SPACINGS / ROWS_SLICE_SPACINGS)
-    slice_mm = ROWS_SLICE_SPACINGS * spacing_mm
+    slice_mm, slices = ROWS_SLICE_SPACINGS * spacing_mm, round(ROWS_DEPTH_SPACINGS / ROWS_SLICE_SPACINGS)
     number = np.floor(depth_mm / slice_mm)
-    should_be = smoothed(per_mm * slice_mm, stations, curve, width_mm)
-    widest, run = np.zeros(len(stations)), np.zeros(len(stations))
-    for k in range(slices):
-        count = smoothed(sums(s_mm[number == k], stations, curve), stations, curve, width_mm)
-        run = np.where(count < EMPTY_SLICE * should_be, run + slice_mm, 0.0)
-        widest = np.maximum(widest, run)
-    # In a gap of the scan there is nothing at all: that is another matter.
-    seen = smoothed((per_mm > 0.0).astype(np.float64), stations, curve, width_mm)
-    whole = smoothed(np.ones(len(stations)), stations, curve, width_mm)
-    return np.where((per_mm > 0.0) & (seen > 0.5 * whole) & (widest >= 0.99 * STRIP_SPACINGS * spacing_mm), widest, 0.0)
+    counts = np.stack([sums(s_mm[number == k], stations, curve) for k in range(slices)], axis=1)
+    shown, gap = per_mm > 0.0, np.zeros(len(stations))
+    for width, least in STRIPS_SPACINGS:
+        around = partial(smoothed, stations=stations, curve=curve, width_mm=width * spacing_mm)
+        empty = around(counts) < EMPTY_SLICE * slice_mm * around(per_mm)[:, None]
+        widest, run = np.zeros(len(stations)), np.zeros(len(stations))
+        for column in empty.T:
+            run = np.where(column, run + slice_mm, 0.0)
+            widest = np.maximum(widest, run)
+        # In a gap of the scan there is nothing at all: that is another matter.
+        whole = around(shown.astype(np.float64)) > 0.5 * around(np.ones(len(stations)))
+        gap = np.maximum(gap, np.where(shown & whole & (widest >= 0.99 * least * spacing_mm), widest, 0.0))
+    return gap
 
 
 def _turn_in_surface(curve: FramedCurve, stations: FloatArray) -> FloatArray:

@@ -8,6 +8,8 @@ import pytest
 from sicp_cam.errors import RegistrationError
 from sicp_cam.findings import Level
 from sicp_cam.registration.register import register_contours
+from sicp_cam.toolpath.registration_gates import registration_gates
+from sicp_cam.toolpath.settings import GateLimits
 
 
 def register(case):
@@ -60,7 +62,7 @@ def test_rows_parallel_to_a_straight_edge_are_told(conditions, start_mm):
     assert any(finding.level is Level.WARN and "row" in finding.message for finding in found.findings)
 
 
-@pytest.mark.xfail(strict=True, reason="of the stations beside such rows 40 and 60 % state 0.05 to 0.1 mm")
+@pytest.mark.xfail(strict=True, reason="of the stations beside such rows 26 and 17 % state less: those near corners")
 @pytest.mark.parametrize("start_mm", [0.05, 1.4])
 def test_the_uncertainty_beside_rows_parallel_to_an_edge_is_that_of_their_gap(conditions, start_mm):
     (contour,) = register(conditions.in_rows(conditions.frame_opening(), 1, start_mm=start_mm)).contours
@@ -79,22 +81,18 @@ def blank(lib, seed, allowance_mm=None, half=False):
     return lib.build(egg, seed, uv=uv)
 
 
-@pytest.mark.parametrize(
-    "allowance_mm",
-    [
-        None,
-        pytest.param(
-            12.0, marks=pytest.mark.xfail(strict=True, reason="follows the rough edge 12 mm off without a warning")
-        ),
-    ],
-)
-def test_a_contour_that_is_not_cut_yet_is_told(conditions, allowance_mm):
-    try:
-        found = register(blank(conditions, 1, allowance_mm))
-    except RegistrationError as refusal:
-        assert "not cut" in str(refusal)
-    else:
-        assert any(finding.level is Level.WARN and "not cut" in finding.message for finding in found.findings)
+def test_a_contour_that_is_not_cut_yet_is_told(conditions):
+    found = register(blank(conditions, 1))
+    assert found.contours[0].uncut
+    assert any(finding.level is Level.WARN and "not cut" in finding.message for finding in found.findings)
+
+
+@pytest.mark.parametrize("allowance_mm", [2.0, 12.0])
+def test_stock_left_all_round_fails_the_gate_of_size(conditions, allowance_mm):
+    gates = registration_gates(register(blank(conditions, 1, allowance_mm)), GateLimits())
+    (size,) = (gate for gate in gates if gate.name == "size_mm")
+    assert size.state == "fail"
+    assert size.value == pytest.approx(allowance_mm, rel=0.2)
 
 
 def test_where_half_of_a_contour_is_cut_only_that_half_is_covered(conditions):

@@ -124,7 +124,6 @@ def test_the_roughness_of_what_has_been_done_counts_too(circle):
     assert roughness(waved, waved.moved) == pytest.approx(exact, rel=0.05)
 
 
-@pytest.mark.xfail(strict=True, reason="rigid motions are taken at the ends for the splines centred beyond them")
 def test_a_turn_of_an_open_contour_costs_nothing_and_its_bow_what_it_is(synthetic):
     curve = framed(synthetic.contour(synthetic.wavy_edge(300.0, 1e-6), rings_mm=()))
     space = in_surface(CurveSplines(20, curve.length_mm, False), curve, curve)
