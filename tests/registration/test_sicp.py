@@ -163,3 +163,14 @@ def test_an_open_edge_is_followed_to_its_ends(synthetic):
     assert np.abs(error.normal[inner]).mean() < 0.1
     assert error.both.max() < 0.3
     assert contour.covered[inner].mean() > 0.95
+
+
+@pytest.mark.parametrize("offset_mm", [0.4, -0.3])
+def test_the_edge_offset_moves_the_contour_out_of_the_material(synthetic, sagging, registered, offset_mm):
+    """A scanner that rounds the edge off shows too little material: the edge lies that much further outside."""
+    settings = replace(sagging.settings, edge_offset_mm=offset_mm)
+    found = register_contours({1: sagging.contour}, sagging.scan, sagging.start, settings=settings)
+    error = synthetic.errors(found.contours[0].corrected, sagging.outline, sagging.bent, sagging.pose)
+    without = registered("sicp")[1]
+    assert np.mean(error.normal - without.normal) == pytest.approx(-offset_mm, abs=0.02)
+    assert np.abs(error.out).mean() < np.abs(without.out).mean() + 0.005
