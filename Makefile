@@ -27,7 +27,7 @@ demo: $(READY)
 	$(VENV)/bin/sicp-cam correct samples/porthole/job.toml --out out/porthole --force
 
 test: $(READY)
-	OMP_NUM_THREADS=1 $(RUN) -m pytest --doctest-modules sicp_cam formats postprocessors tests
+	OMP_NUM_THREADS=1 $(RUN) -m pytest -n auto --dist loadfile --doctest-modules sicp_cam formats postprocessors tests
 
 lint: $(INSTALLED)
 	$(RUN) -m ruff check .

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from sicp_cam.contour.mesh_contours import mesh_contours
 from sicp_cam.contour.projection import nearest
 from sicp_cam.errors import InputError, JobError, PathError, RegistrationError, UnitError
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import BoolArray, Contour, FloatArray, Part, Scan, ToolPath
+from sicp_cam.model import BoolArray, Contour, FloatArray, Part, Scan, Source, ToolPath
 from sicp_cam.registration.register import register_contours
 from sicp_cam.registration.result import Registration
 from sicp_cam.registration.settings import METHODS, RegistrationSettings
@@ -29,7 +29,7 @@ from sicp_cam.units import MM_PER_UNIT
 
 __all__ = [
     "PartRegistration",
-    "check_scan_unit",
+    "check_units",
     "choice_findings",
     "choose_contours",
     "contours_of",
@@ -80,7 +80,7 @@ class PartRegistration:
 
 
 def contours_of(part: Part) -> tuple[Contour, ...]:
-    """Return the contours of a part; for triangles only, the loops along which the mesh is open.
+    """Return the contours of a part; for triangles only, the loops along which the mesh is open or has sharp edges.
 
     Raises
     ------
@@ -91,7 +91,8 @@ def contours_of(part: Part) -> tuple[Contour, ...]:
     if not contours:
         name = part.source.path if part.source else "part"
         raise InputError(
-            f"{name}: the mesh is closed, so it has no open edge; give a STEP file, or only the skin that is machined"
+            f"{name}: the mesh is closed and smooth, so it has no open edge and no sharp one; give a STEP file,"
+            " or only the skin that is machined"
         )
     return contours
 
@@ -206,37 +207,53 @@ def _refuse_axes_into_the_part(chosen: Mapping[int, Contour], steps: Steps, feed
             )
 
 
-def check_scan_unit(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> None:
-    """Refuse a scan whose size only makes sense in another unit.
+def check_units(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> tuple[Finding, ...]:
+    """Say which units were taken because the files state none, and refuse a scan that only makes sense in another.
 
     A scan of the contour is no smaller than most of the contour and no larger than the part; where the file states no
-    unit and millimetres put it outside of that, but another unit inside, it is in that unit.
+    unit and the one that was taken puts it outside of that, but another one inside, it is in that other unit.
 
     Raises
     ------
     UnitError
         Naming the likely unit.
     """
+    part_size = _diagonal(part.mesh.vertices_mm)
+    findings = []
+    if part.source is not None and not part.source.unit_stated:
+        findings.append(_unit_taken(part.source, f"the part is {part_size:.4g} mm across", "--cad-units"))
     if scan.source is None or scan.source.unit_stated:
-        return
+        return tuple(findings)
     size = _diagonal(scan.points_mm)
     least = 0.5 * max(_diagonal(contour.points_mm) for contour in contours.values())
-    most = 1.5 * max(_diagonal(part.mesh.vertices_mm), 2.0 * least)
-    if least <= size <= most:
-        return
-    sizes = np.array([_diagonal(part.mesh.vertices_mm), 2.0 * least])
-    off = {
-        unit: float(np.abs(np.log(size * factor / sizes)).min())
-        for unit, factor in MM_PER_UNIT.items()
-        if unit != "mm" and least <= size * factor <= most
-    }
-    fitting = sorted((unit for unit in off if off[unit] <= min(off.values()) + CLEARLY_WORSE), key=lambda u: off[u])
-    if fitting:
+    most = 1.5 * max(part_size, 2.0 * least)
+    if not least <= size <= most and (fitting := _units_fitting(scan.source.unit, size, part_size, least, most)):
         options = " or ".join(f"--scan-units {unit}" for unit in fitting)
         raise UnitError(
-            f"{scan.source.path}: {size:.4g} mm across, where the part has {_diagonal(part.mesh.vertices_mm):.4g} mm;"
-            f" it seems to be in {' or '.join(fitting)}: give {options}, or --scan-units mm if it is not"
+            f"{scan.source.path}: {size:.4g} mm across, where the part has {part_size:.4g} mm;"
+            f" it seems to be in {' or '.join(fitting)}: give {options}, or --scan-units {scan.source.unit} if it is"
+            " not"
         )
+    told = f"the scan is {size:.4g} mm across, the part {part_size:.4g} mm"
+    return (*findings, _unit_taken(scan.source, told, "--scan-units"))
+
+
+def _unit_taken(source: Source, told: str, flag: str) -> Finding:
+    return Finding(
+        409, Level.WARN, f"the file states no unit, {source.unit} was taken: {told}; state it with {flag}", source.path
+    )
+
+
+def _units_fitting(taken: str, size_mm: float, part_size_mm: float, least_mm: float, most_mm: float) -> list[str]:
+    """Return the units, the likeliest first, in which a scan read in another one would have a size that makes sense."""
+    sizes = np.array([part_size_mm, 2.0 * least_mm])
+    scales = {unit: mm / MM_PER_UNIT[taken] for unit, mm in MM_PER_UNIT.items() if unit != taken}
+    off = {
+        unit: float(np.abs(np.log(size_mm * scale / sizes)).min())
+        for unit, scale in scales.items()
+        if least_mm <= size_mm * scale <= most_mm
+    }
+    return sorted((unit for unit in off if off[unit] <= min(off.values()) + CLEARLY_WORSE), key=lambda u: off[u])
 
 
 def refuse_twins(
@@ -331,9 +348,11 @@ def register(
     if align is not None and not is_rigid(np.asarray(align)):
         raise JobError("align: no rigid motion; a finite (4, 4) matrix T_scan_part without scale or mirror is needed")
     gates = gates or GateLimits()
+    part = replace(part, contours=contours_of(part))
     chosen = choose_contours(contours_of(part), path, contours, gates.path_distance_mm)
-    check_scan_unit(scan, part, chosen)
+    noticed = check_units(scan, part, chosen)
     refuse_twins(contours_of(part), chosen, align, None)
     result = register_contours(chosen, scan, align, method=method, settings=settings)
+    result = replace(result, findings=(*noticed, *result.findings))
     refuse_twins(contours_of(part), chosen, result.T_scan_part if align is None else align, result.T_scan_part)
     return PartRegistration(result, toolpath or ToolPathSettings(), gates)

@@ -42,6 +42,7 @@ def inspect(
     units: str | None = None,
     options: Mapping[str, object] | None = None,
     picture: Path | None = None,
+    recover: bool = False,
     force: bool = False,
     limits: Limits = DEFAULT_LIMITS,
 ) -> dict[str, Any]:
@@ -53,7 +54,7 @@ def inspect(
         The file.
     role
         `scan`, `part` or `path`.
-    units, options, limits
+    units, options, recover, limits
         As for the readers.
     picture
         PNG file to draw the part or scan into, with its contours or loops numbered as here. Walls, the contours of
@@ -79,7 +80,7 @@ def inspect(
         if role == "path":
             raise InputError(f"{printable(str(path))}: a path is not drawn; leave out --picture")
         output.check_free(picture.parent, [picture.name], force, [path])
-    given: dict[str, Any] = {"units": units, "limits": limits, "options": options or {}}
+    given: dict[str, Any] = {"units": units, "limits": limits, "options": options or {}, "recover": recover}
     if role == "path":
         return _path_document(path, plugins.read_path(path, **given))
     document, scene = _part_document(path, given) if role == "part" else _scan_document(path, given)
@@ -190,6 +191,7 @@ def _scan_document(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, Any]
         "bounds": _bounds(scan.points_mm),
         "triangles": 0 if scan.faces is None else len(scan.faces),
         "normals": scan.normals is not None,
+        "columns": [*scan.columns],
         "spacing_mm": round(surface.spacing_mm, 3) if surface else None,
         "loops": [_loop_entry(number, loop) for number, loop in enumerate(loops, 1)],
     }

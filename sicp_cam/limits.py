@@ -14,7 +14,9 @@ class Limits:
     Parameters
     ----------
     file_bytes
-        Largest input file.
+        Largest input file; of a gzip file, also the most bytes in it.
+    archive_ratio
+        How many times its own size a gzip file may unpack to.
     points, faces
         Most points and triangles of a scan or mesh.
     header_bytes, header_lines
@@ -34,6 +36,7 @@ class Limits:
     """
 
     file_bytes: int = 4 * 2**30
+    archive_ratio: float = 200.0
     points: int = 200_000_000
     faces: int = 100_000_000
     header_bytes: int = 2**20

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +24,10 @@ __all__ = [
     "EventKind",
     "FloatArray",
     "IntArray",
+    "Original",
     "Part",
     "Program",
+    "Rewritten",
     "Scan",
     "Source",
     "Status",
@@ -38,19 +40,28 @@ IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
 
+def _own(value: npt.ArrayLike, dtype: type) -> npt.NDArray[Any]:
+    """Return an array that nobody else can change: a copy, unless its maker has locked it already."""
+    if isinstance(value, np.ndarray) and value.base is None and not value.flags.writeable:
+        return np.ascontiguousarray(value, dtype=dtype)
+    return np.array(value, dtype=dtype, order="C")
+
+
 def _vectors(name: str, value: npt.ArrayLike, rows: int | None = None) -> FloatArray:
-    array = np.array(value, dtype=np.float64, order="C")
+    array = _own(value, np.float64)
     if array.ndim != 2 or array.shape[1] != 3 or (rows is not None and len(array) != rows):
         expected = "n" if rows is None else str(rows)
         raise ValueError(f"{name} must have shape ({expected}, 3), not {array.shape}")
-    if not np.isfinite(array).all():
+    with np.errstate(over="ignore", invalid="ignore"):
+        finite = np.isfinite(array.sum()) or np.isfinite(array).all()  # a finite sum is the quicker proof
+    if not finite:
         raise ValueError(f"{name} holds numbers that are not finite")
     array.setflags(write=False)
     return array
 
 
 def _column(name: str, value: npt.ArrayLike, rows: int, dtype: type) -> npt.NDArray[np.generic]:
-    array: npt.NDArray[np.generic] = np.array(value, dtype=dtype, order="C")
+    array = _own(value, dtype)
     if array.shape != (rows,):
         raise ValueError(f"{name} must have shape ({rows},), not {array.shape}")
     array.setflags(write=False)
@@ -58,7 +69,7 @@ def _column(name: str, value: npt.ArrayLike, rows: int, dtype: type) -> npt.NDAr
 
 
 def _faces(name: str, value: npt.ArrayLike, vertices: int) -> IntArray:
-    array = np.array(value, dtype=np.int64, order="C")
+    array = _own(value, np.int64)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must have shape (m, 3), not {array.shape}")
     if array.size and (array.min() < 0 or array.max() >= vertices):
@@ -99,7 +110,8 @@ class TriangleMesh:
 class Scan:
     """A measured surface in the scan frame: points (n, 3) in mm, with normals and triangles where the file has them.
 
-    `normals` are unit vectors on the outward side, or zero where the file gives none for a point.
+    `normals` are unit vectors on the outward side, or zero where the file gives none for a point. `columns` are further
+    (n,) numbers of each point, by the name that the file gives them: intensity, red, quality ...
     """
 
     points_mm: FloatArray
@@ -107,6 +119,7 @@ class Scan:
     faces: IntArray | None = None
     source: Source | None = None
     findings: tuple[Finding, ...] = ()
+    columns: Mapping[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:
         points = _vectors("points_mm", self.points_mm)
@@ -115,6 +128,8 @@ class Scan:
             object.__setattr__(self, "normals", _vectors("normals", self.normals, len(points)))
         if self.faces is not None:
             object.__setattr__(self, "faces", _faces("faces", self.faces, len(points)))
+        columns = {name: _column(name, values, len(points), np.float64) for name, values in self.columns.items()}
+        object.__setattr__(self, "columns", MappingProxyType(columns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -214,6 +229,45 @@ class Event:
     line: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Rewritten:
+    """A program written again in its own words: its bytes, and what must be said about them."""
+
+    content: bytes
+    findings: tuple[Finding, ...] = ()
+
+
+class Original(Protocol):
+    """The program that a path was read from, which can be written again with other coordinates.
+
+    Whoever reads a program knows its dialect best; the path carries this along, so that a postprocessor can write the
+    same program again without knowing any format.
+    """
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of the file, with its dot, such as `.apt`."""
+
+    def rewritten(self, path: ToolPath, source_moves: IntArray) -> Rewritten:
+        """Return the program with the moves of a path.
+
+        Parameters
+        ----------
+        path
+            The path that was read from this program, or that path corrected: in the frame of the program.
+        source_moves
+            (n,) index of the move, as it was read, that each move of `path` ends or is a part of; it never falls, and
+            the last of those with one index is that move itself, those before it were added.
+
+        Returns
+        -------
+        Rewritten
+            Byte for byte the program that was read where no move differs; otherwise only coordinates, tool axes and
+            inverse-time feeds differ, and lines stand for added moves. A finding of level FAIL tells that the program
+            has no words for something that must be said; no content then.
+        """
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ToolPath:
     """Moves of the tool tip, in order, and the events between them.
@@ -230,6 +284,8 @@ class ToolPath:
         (n,) True for rapid moves.
     lines
         (n,) 1-based line of the source that each move came from; 0 if there is none.
+    original
+        The program that the path was read from, where its format can be written again.
     """
 
     tips_mm: FloatArray
@@ -241,6 +297,7 @@ class ToolPath:
     name: str = ""
     source: Source | None = None
     findings: tuple[Finding, ...] = ()
+    original: Original | None = None
 
     def __post_init__(self) -> None:
         tips = _vectors("tips_mm", self.tips_mm)
@@ -288,6 +345,8 @@ class Program:
     overridden
         One line for each gate that failed and that the operator overrode: its name, value and limit. Every post writes
         them.
+    source_moves
+        (n,) move of the path as it was read that each move is or is a part of, see `Original`; None if not known.
     """
 
     name: str
@@ -297,10 +356,14 @@ class Program:
     notes: tuple[str, ...] = ()
     columns: Mapping[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
     overridden: tuple[str, ...] = ()
+    source_moves: IntArray | None = None
 
     def __post_init__(self) -> None:
         if len(self.status) != len(self.path):
             raise ValueError(f"{len(self.status)} statuses for {len(self.path)} moves")
+        if self.source_moves is not None:
+            moves = _column("source_moves", self.source_moves, len(self.path), np.int64)
+            object.__setattr__(self, "source_moves", moves)
         pose = np.array(self.T_scan_program, dtype=np.float64)
         if pose.shape != (4, 4) or not np.isfinite(pose).all():
             raise ValueError("T_scan_program must be a finite (4, 4) matrix")

@@ -18,7 +18,7 @@ from sicp_cam.alignment import read_alignment
 from sicp_cam.beside import beside
 from sicp_cam.correction import (
     PartRegistration,
-    check_scan_unit,
+    check_units,
     choice_findings,
     choose_contours,
     contours_of,
@@ -148,10 +148,11 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
         T_start, noticed = _start(job)
         inputs = _read(job)
     with clock.step("contour", 0.2):
+        inputs = replace(inputs, part=replace(inputs.part, contours=contours_of(inputs.part)))
         wanted = None if job.contour == "auto" else job.contour
         chosen = choose_contours(contours_of(inputs.part), inputs.path, wanted, job.gates.path_distance_mm)
         noticed += choice_findings(contours_of(inputs.part), chosen, inputs.path)
-        check_scan_unit(inputs.scan, inputs.part, chosen)
+        noticed += check_units(inputs.scan, inputs.part, chosen)
     with clock.step("register", 0.3):
         refuse_twins(contours_of(inputs.part), chosen, T_start, None)
         result = register_contours(chosen, inputs.scan, T_start, method=job.method, settings=job.registration)
@@ -199,12 +200,18 @@ def _read(job: Job) -> Inputs:
 
     def scan_and_path() -> tuple[Scan, ToolPath]:
         return (
-            plugins.read_scan(job.scan, units=job.scan_units, limits=job.limits, options=job.scan_options),
-            plugins.read_path(job.path, units=job.path_units, limits=job.limits, options=path_options),
+            plugins.read_scan(
+                job.scan, units=job.scan_units, limits=job.limits, options=job.scan_options, recover=job.recover
+            ),
+            plugins.read_path(
+                job.path, units=job.path_units, limits=job.limits, options=path_options, recover=job.recover
+            ),
         )
 
     others = beside(scan_and_path)
-    part = plugins.read_part(job.cad, units=job.cad_units, limits=job.limits, options=job.part_options)
+    part = plugins.read_part(
+        job.cad, units=job.cad_units, limits=job.limits, options=job.part_options, recover=job.recover
+    )
     return Inputs(part, *others.result())
 
 

@@ -100,7 +100,9 @@ class Correction:
             if gate.state == "overridden"
         )
         notes, columns = tuple(_notes(self)), _columns(self.corrected)
-        return Program(self.job.name, path, self.corrected.status, T, notes, columns, broken)
+        return Program(
+            self.job.name, path, self.corrected.status, T, notes, columns, broken, self.corrected.source_moves
+        )
 
     def files(
         self, post: str, options: Mapping[str, object] | None = None

@@ -81,7 +81,7 @@ def is_rigid(T: FloatArray, tolerance: float = 1e-6) -> bool:
     return bool(
         T.shape == (4, 4)
         and np.isfinite(T).all()
-        and np.allclose(T[3], [0, 0, 0, 1], atol=tolerance)
-        and np.allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), atol=tolerance)
+        and np.allclose(T[3], [0, 0, 0, 1], rtol=0.0, atol=tolerance)
+        and np.allclose(T[:3, :3].T @ T[:3, :3], np.eye(3), rtol=0.0, atol=tolerance)
         and np.linalg.det(T[:3, :3]) > 0
     )

@@ -53,27 +53,44 @@ def correct(
 
 
 def read_part(
-    path: str | os.PathLike[str], *, units: str | None = None, limits: Limits = DEFAULT_LIMITS, **options: object
+    path: str | os.PathLike[str],
+    *,
+    units: str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+    recover: bool = False,
+    **options: object,
 ) -> Part:
     """Read a nominal part, in millimetres; `options` are what its reader takes.
+
+    With `recover`, what can be repaired is repaired, and each repair stands in the findings.
 
     Raises
     ------
     InputError
         If the file cannot be read; the message names file and line or byte.
     """
-    return plugins.read_part(Path(path), units=units, limits=limits, options=options)
+    return plugins.read_part(Path(path), units=units, limits=limits, options=options, recover=recover)
 
 
 def read_scan(
-    path: str | os.PathLike[str], *, units: str | None = None, limits: Limits = DEFAULT_LIMITS, **options: object
+    path: str | os.PathLike[str],
+    *,
+    units: str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+    recover: bool = False,
+    **options: object,
 ) -> Scan:
     """Read a scan, in millimetres; parameters and errors as in `read_part`."""
-    return plugins.read_scan(Path(path), units=units, limits=limits, options=options)
+    return plugins.read_scan(Path(path), units=units, limits=limits, options=options, recover=recover)
 
 
 def read_path(
-    path: str | os.PathLike[str], *, units: str | None = None, limits: Limits = DEFAULT_LIMITS, **options: object
+    path: str | os.PathLike[str],
+    *,
+    units: str | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+    recover: bool = False,
+    **options: object,
 ) -> ToolPath:
     """Read a tool path, in millimetres and mm/min; parameters and errors as in `read_part`."""
-    return plugins.read_path(Path(path), units=units, limits=limits, options=options)
+    return plugins.read_path(Path(path), units=units, limits=limits, options=options, recover=recover)

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
-from sicp_cam.correction import PartRegistration, check_scan_unit, choose_contours, contours_of, register
+from sicp_cam.correction import PartRegistration, check_units, choose_contours, contours_of, register
 from sicp_cam.errors import InputError, JobError, PathError, RegistrationError, SicpError, UnitError
+from sicp_cam.findings import Level
 from sicp_cam.model import Contour, Part, Scan, Source, ToolPath, TriangleMesh
 from sicp_cam.rigid_motion import apply, from_parts, rotate
 
@@ -20,12 +22,6 @@ def square(side=400.0):
     return TriangleMesh(
         [[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]], [[0, 1, 2], [0, 2, 3]]
     )
-
-
-def cube():
-    corners = np.array([[x, y, z] for x in (0, 50.0) for y in (0, 50.0) for z in (0, 50.0)])
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return TriangleMesh(corners, [triangle for a, b, c, d in quads for triangle in ((a, b, c), (a, c, d))])
 
 
 def source(path, stated=False, unit="mm"):
@@ -69,11 +65,12 @@ def test_a_mesh_gives_its_open_loops():
 
 
 @pytest.mark.parametrize("named", [True, False])
-def test_a_closed_mesh_has_nothing_to_follow(named):
-    part = Part((), cube(), source("box.stl") if named else None)
-    with pytest.raises(InputError, match="no open edge; give a STEP file") as caught:
+def test_a_smooth_closed_mesh_has_nothing_to_follow(named):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=25.0)
+    part = Part((), TriangleMesh(ball.vertices, ball.faces), source("ball.stl") if named else None)
+    with pytest.raises(InputError, match="no open edge and no sharp one; give a STEP file") as caught:
         contours_of(part)
-    assert str(caught.value).startswith("box.stl: " if named else "part: ")
+    assert str(caught.value).startswith("ball.stl: " if named else "part: ")
 
 
 # ---- the choice ----
@@ -167,7 +164,7 @@ def round_hole(synthetic):
 def test_a_scan_in_another_unit_is_refused_and_the_unit_named(synthetic, unit):
     factor = {"cm": 0.1, "m": 0.001, "inch": 1 / 25.4}[unit]
     with pytest.raises(UnitError, match=f"seems to be in {unit}: give --scan-units {unit}") as caught:
-        check_scan_unit(whole_scan(factor), Part((), square()), round_hole(synthetic))
+        check_units(whole_scan(factor), Part((), square()), round_hole(synthetic))
     assert str(caught.value).startswith("scan.ply: ")
 
 
@@ -176,7 +173,7 @@ def test_a_scan_in_another_unit_is_refused_whatever_the_guess(synthetic, factor)
     with pytest.raises(
         UnitError, match=r"give --scan-units \w+( or --scan-units \w+)*, or --scan-units mm if it is not"
     ):
-        check_scan_unit(whole_scan(factor), Part((), square()), round_hole(synthetic))
+        check_units(whole_scan(factor), Part((), square()), round_hole(synthetic))
 
 
 @pytest.mark.parametrize(
@@ -191,7 +188,30 @@ def test_a_scan_in_another_unit_is_refused_whatever_the_guess(synthetic, factor)
     ],
 )
 def test_a_scan_whose_unit_may_be_right_passes(synthetic, scan):
-    check_scan_unit(scan, Part((), square()), round_hole(synthetic))
+    noticed = check_units(scan, Part((), square()), round_hole(synthetic))
+    assert all(finding.code == 409 for finding in noticed)
+
+
+def test_a_unit_that_was_taken_is_told_with_the_sizes_that_speak_for_it(synthetic):
+    part = Part((), square(), source("part.stl"))
+    (of_part, of_scan) = check_units(whole_scan(1.0), part, round_hole(synthetic))
+    assert (of_part.level, of_part.where) == (Level.WARN, "part.stl")
+    assert of_part.message == (
+        "the file states no unit, mm was taken: the part is 565.7 mm across; state it with --cad-units"
+    )
+    assert of_scan.message == (
+        "the file states no unit, mm was taken: the scan is 565.7 mm across, the part 565.7 mm; state it with"
+        " --scan-units"
+    )
+    stated = Part((), square(), source("part.stl", stated=True))
+    assert check_units(whole_scan(1.0, stated=True), stated, round_hole(synthetic)) == ()
+
+
+def test_a_unit_that_a_format_has_by_convention_is_doubted_too(synthetic):
+    """A PTX file is taken for metres; one that an exporter wrote in millimetres is a thousand times too large."""
+    scan = Scan(whole_scan(1000.0).points_mm, source=source("scan.ptx", unit="m"))
+    with pytest.raises(UnitError, match="seems to be in mm: give --scan-units mm, or --scan-units m if it is not"):
+        check_units(scan, Part((), square()), round_hole(synthetic))
 
 
 # ---- registration ----

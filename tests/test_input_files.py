@@ -80,7 +80,7 @@ def test_only_what_cannot_be_read_in_its_role_is_wrong():
 
 
 def test_three_files_in_a_ring_are_told_one_by_one():
-    files = {"part": Path("a.ply"), "scan": Path("a.nc"), "path": Path("a.step")}
+    files = {"part": Path("a.asc"), "scan": Path("a.nc"), "path": Path("a.step")}
     assert list(wrong_places(files)) == ["part", "scan", "path"]
     assert all("give another file with" in text for text in wrong_places(files).values())
 

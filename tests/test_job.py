@@ -322,7 +322,7 @@ def test_python_values_make_a_layer_too(folder):
     ("stated", "told"),
     [
         ({"post": "VAL3"}, "post: no postprocessor 'VAL3'; did you mean val3?"),
-        ({"post": "csv,fanuc"}, "post: no postprocessor 'fanuc'; known: csv, gcode, val3"),
+        ({"post": "csv,fanuc"}, "post: no postprocessor 'fanuc'; known: apt, csv, dxf, gcode, same, val3"),
         ({"method": "rigd"}, "method: no method 'rigd'; did you mean rigid?"),
         ({"report": "pfd"}, "report: must be one of pdf, png, not 'pfd' (did you mean pdf?); or none for no report"),
         ({"frame": "Part"}, "frame: must be one of scan, part, not 'Part' (did you mean part?)"),
@@ -357,7 +357,7 @@ def test_a_key_without_its_table_is_answered_with_the_whole_one(folder, pair, me
     [
         (
             {"cad": "scan.ply", "scan": "part.step"},
-            "cad: scan.ply is read as a scan, not as a part: are --cad and --scan swapped?",
+            "scan: part.step is read as a part, not as a scan: are --cad and --scan swapped?",
         ),
         (
             {"scan": "trim.apt", "path": "scan.ply"},

@@ -61,7 +61,7 @@ def test_our_own_readers_and_posts_are_listed_with_their_owner():
     found, findings = plugin_registry.listing()
     ours = {(p.group, p.name): p for p in found if p.owner.startswith("sicp-cam ")}
     assert ours[FORMATS, "scan.ply"].value == "sicp_formats.ply:read_scan"
-    assert {name for group, name in ours if group == POSTS} == {"val3", "gcode", "csv"}
+    assert {name for group, name in ours if group == POSTS} == {"apt", "csv", "dxf", "gcode", "same", "val3"}
     assert not [finding for finding in findings if finding.level != "info"]
 
 
@@ -99,7 +99,9 @@ def test_an_unknown_suffix_is_answered_with_the_known_ones():
     with pytest.raises(InputError) as caught:
         plugins.read_part(Path("folder/part.dwg"))
     message = str(caught.value)
-    assert message.startswith("folder/part.dwg: no reader for a part with the suffix '.dwg'; readable: step, stl, stp")
+    assert message.startswith(
+        "folder/part.dwg: no reader for a part with the suffix '.dwg'; readable: brep, brp, iges, igs, obj"
+    )
     assert "--set part.format=" in message
 
 
@@ -119,8 +121,8 @@ def test_reader_and_options_can_be_checked_without_a_file(distribution):
     plugins.check_reader("scan", nowhere / "part.alpha", {"scale": 2.0})
     plugins.check_reader("scan", nowhere / "part.dat", {"format": "alpha", "skip": True})
     assert not hasattr(sys.modules["alpha"].read_scan, "told")
-    with pytest.raises(InputError, match=r"part\.dat: no reader for a scan with the suffix '\.dat'"):
-        plugins.check_reader("scan", nowhere / "part.dat")
+    with pytest.raises(InputError, match=r"part\.dwg: no reader for a scan with the suffix '\.dwg'"):
+        plugins.check_reader("scan", nowhere / "part.dwg")
     with pytest.raises(JobError, match=r"^scan\.scal: unknown option; did you mean scale\?"):
         plugins.check_reader("scan", nowhere / "part.alpha", {"scal": 2.0})
 
@@ -145,7 +147,7 @@ def test_two_owners_of_a_name_are_both_named_when_it_is_needed_and_when_it_is_li
     assert "sicp-cam " in str(caught.value)
     found, findings = plugin_registry.listing()
     assert [finding.message for finding in findings if finding.code == 801] == [str(caught.value)]
-    assert len([plugin for plugin in found if plugin.name == "scan.ply"]) == 2
+    assert len([plugin for plugin in found if (plugin.group, plugin.name) == (FORMATS, "scan.ply")]) == 2
     assert "alpha" not in sys.modules
 
 
@@ -201,7 +203,7 @@ def test_an_unknown_post_is_answered_with_the_nearest():
         plugins.postprocessor("val")
     with pytest.raises(JobError, match=r"no postprocessor 'VAL3'; did you mean val3\?"):
         plugins.postprocessor("VAL3")
-    with pytest.raises(JobError, match="no postprocessor 'XYZ'; known: csv, gcode, val3"):
+    with pytest.raises(JobError, match="no postprocessor 'XYZ'; known: apt, csv, dxf, gcode, same, val3"):
         plugins.postprocessor("XYZ")
 
 

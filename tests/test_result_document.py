@@ -203,7 +203,9 @@ def corrected(change, axes=None, words=None, added=None):
     shifted = tips + np.outer(change, [0.0, 0.0, 1.0])
     moved = ToolPath(shifted, up if axes is None else axes, np.ones(n), np.zeros(n, bool), np.zeros(n))
     words = (Status.COVERED,) * n if words is None else words
-    return CorrectedPath(rigid, rigid, moved, words, np.zeros(n, bool) if added is None else np.array(added, bool))
+    return CorrectedPath(
+        rigid, rigid, moved, words, np.arange(n), np.zeros(n, bool) if added is None else np.array(added, bool)
+    )
 
 
 def test_a_correction_is_told_by_its_largest_move_turn_and_step():

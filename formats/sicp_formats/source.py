@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import re
 import stat
+import tempfile
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from sicp_cam.errors import FormatError
 from sicp_cam.limits import Limits
 from sicp_cam.model import Source
 
-__all__ = ["describe", "read_bytes"]
+__all__ = ["describe", "plain_file", "read_bytes"]
 
 # A file that was never unpacked, or that a web server or Git put in place of the one that was asked for.
 _FOREIGN = (
-    (re.compile(rb"\x1f\x8b"), "a gzip archive; unpack it first"),
+    (re.compile(rb"\x1f\x8b"), "a gzip archive; name it .gz behind its suffix, or unpack it first"),
     (re.compile(rb"PK\x03\x04"), "a zip archive; unpack it first"),
     (re.compile(rb"BZh[1-9]1AY&SY"), "a bzip2 archive; unpack it first"),
     (re.compile(rb"\xfd7zXZ\x00"), "an xz archive; unpack it first"),
@@ -34,13 +38,14 @@ _FOREIGN = (
 
 
 def read_bytes(path: Path, limits: Limits) -> bytes:
-    """Return the whole content of a regular file.
+    """Return the whole content of a regular file, unpacked if its name ends with `.gz`.
 
     Raises
     ------
     FormatError
         If the file does not exist, is no regular file, may not be read, is empty or larger than `limits.file_bytes`,
-        or is an archive, an HTML page, a PDF or a Git LFS pointer.
+        unpacks to more than that or than `limits.archive_ratio` allows, or is another archive, an HTML page, a PDF or
+        a Git LFS pointer.
     """
     try:
         status = path.stat()
@@ -59,19 +64,71 @@ def read_bytes(path: Path, limits: Limits) -> bytes:
     except ValueError as error:  # a NUL in the name
         raise FormatError(path, f"is no possible file name ({error})") from None
     _check_size(path, len(content), limits)
+    if path.suffix.lower() == ".gz":
+        content = _unpacked(path, content, limits)
     for signature, meaning in _FOREIGN:
         if signature.match(content[:1024]):
             raise FormatError(path, f"is {meaning}", byte=0)
     return content
 
 
+@contextlib.contextmanager
+def plain_file(path: Path, content: bytes) -> Iterator[Path]:
+    """Give a library that reads files itself one that is not packed: the file, or a copy for as long as it is needed.
+
+    Parameters
+    ----------
+    path
+        The file, as the user named it.
+    content
+        What `read_bytes` returned for it.
+    """
+    if path.suffix.lower() != ".gz":
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="sicp-cam-") as folder:
+        copy = Path(folder) / path.stem
+        copy.write_bytes(content)
+        yield copy
+
+
 def describe(path: Path, content: bytes, *, format: str, unit: str, unit_stated: bool) -> Source:
-    """Return the record of an input: its name, format, unit, and the SHA-256 of its content.
+    """Return the record of an input: its name, format, unit, and the SHA-256 of the file, packed if it is packed.
 
     >>> describe(Path("a.ply"), b"", format="PLY", unit="mm", unit_stated=False).sha256[:8]
     'e3b0c442'
     """
+    if path.suffix.lower() == ".gz":
+        content = path.read_bytes()
     return Source(str(path), format, hashlib.sha256(content).hexdigest(), unit, unit_stated)
+
+
+def _unpacked(path: Path, packed: bytes, limits: Limits) -> bytes:
+    """Unpack the members of a gzip file, never further than the limits allow."""
+    cap = int(min(limits.file_bytes, len(packed) * limits.archive_ratio))
+    parts: list[bytes] = []
+    size = 0
+    while packed:
+        member = zlib.decompressobj(wbits=31)
+        try:
+            parts.append(member.decompress(packed, cap + 1 - size))
+        except zlib.error:
+            if parts and not packed.strip(b"\0"):
+                break  # gzip files may be padded with zeros
+            raise FormatError(path, "is no gzip file, or a damaged one; pack it again", byte=0) from None
+        size += len(parts[-1])
+        if size > cap:
+            what = (
+                f"unpacks to more than {cap} bytes, the limits being file_bytes = {limits.file_bytes} and "
+                f"archive_ratio = {limits.archive_ratio:g}; unpack it yourself if it is to be trusted"
+            )
+            raise FormatError(path, what)
+        if not member.eof:
+            raise FormatError(path, "the gzip file ends in the middle of its data; it is cut short", byte=len(packed))
+        packed = member.unused_data
+    if not size:
+        raise FormatError(path, "the gzip file has nothing in it; export it again", byte=0)
+    return b"".join(parts)
 
 
 def _check_size(path: Path, size: int, limits: Limits) -> None:

@@ -103,6 +103,8 @@ class Postprocessor(ABC):
     """One line for the list of plug-ins."""
     Options: ClassVar[type[Any]] = NoOptions
     """Frozen dataclass of the options: each field with a default, and under it a docstring that the user reads."""
+    suffix: ClassVar[str] = ""
+    """Suffix of the file that it writes, with its dot; none where a program is a folder."""
     missing_feed: ClassVar[Level] = Level.FAIL
     """How much a cutting move without feed matters to the controller."""
     options: Any
@@ -160,8 +162,6 @@ class LinePostprocessor(Postprocessor):
     the template's own, so that name, notes and safety line stand in every program; a post gives it the comment syntax.
     """
 
-    suffix: ClassVar[str]
-    """Suffix of the file, with its dot."""
     line_end: ClassVar[str] = "\n"
     comment_drop: ClassVar[str] = ""
     """Characters that a comment may not hold, such as those that end it."""

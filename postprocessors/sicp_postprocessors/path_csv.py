@@ -32,6 +32,7 @@ class PathCsv(Postprocessor):
 
     name = "csv"
     summary = "table x,y,z,i,j,k,feed,rapid,status and further columns"
+    suffix = ".csv"
     missing_feed = Level.WARN
 
     def preflight(self, program: Program) -> list[Finding]:

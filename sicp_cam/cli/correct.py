@@ -53,6 +53,7 @@ def correct(
     override: Annotated[list[str] | None, _with_default("override"), Parameter(help=_OVERRIDE)] = None,
     dry_run: Annotated[bool | None, _with_default("dry_run")] = None,
     force: Annotated[bool | None, _with_default("force")] = None,
+    recover: Annotated[bool | None, _with_default("recover")] = None,
     strict: Annotated[bool | None, _with_default("strict")] = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
     talk: Talk = Talk(),  # noqa: B008  # frozen
@@ -69,11 +70,12 @@ def correct(
     cad
         Nominal part: STEP, or a mesh.
     scan
-        Scan of the part: PLY, STL, or points as text.
+        Scan of the part: PLY, STL, points as text, and more.
     path
-        Tool path: APT or CL data, G-code, CSV.
+        Tool path: APT or CL data, G-code, CSV, DXF, and more.
     post
-        Postprocessors, separated by commas: val3, gcode, csv, ... (see sicp-cam plugins).
+        Postprocessors, separated by commas: val3, gcode, csv, same (the path's own program, corrected), ... (see
+        sicp-cam plugins).
     out
         Folder for the results; made if it does not exist.
     name
@@ -102,6 +104,8 @@ def correct(
         Do everything but write.
     force
         Replace existing results.
+    recover
+        Repair damaged inputs where that can be done, and tell each repair as a warning.
     strict
         Let warnings end the run with exit code 7.
     as_json
@@ -127,6 +131,7 @@ def correct(
         "override": _joined(override),
         "dry_run": dry_run,
         "force": force,
+        "recover": recover,
         "strict": strict,
     }
     with logging_to(talk):

@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
-from sicp_cam.errors import InputError, JobError, printable
 
 __all__ = ["inspect"]
 
@@ -22,6 +21,7 @@ def inspect(
     role: Role | None = None,
     units: str | None = None,
     picture: Path | None = None,
+    recover: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     force: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
@@ -37,11 +37,13 @@ def inspect(
     file
         A scan, a part or a path.
     role
-        What it is, where its suffix leaves that open.
+        What it is, where neither its suffix nor its content tells.
     units
         Unit of its numbers, where the file does not state one: mm, cm, m, inch.
     picture
         Also draw a part or scan into this PNG file, with the numbers of its loops or of the contours of its skins.
+    recover
+        Repair a damaged file where that can be done, and tell each repair as a warning.
     force
         Replace an existing picture.
     set_
@@ -53,37 +55,39 @@ def inspect(
         How much is said.
     """
     with logging_to(talk):
-        return reported(lambda: _run(file, role, units, picture, force, set_ or [], as_json), as_json=as_json)
+        return reported(lambda: _run(file, role, units, picture, recover, force, set_ or [], as_json), as_json=as_json)
 
 
 def _run(
-    file: Path, role: Role | None, units: str | None, picture: Path | None, force: bool, pairs: list[str], as_json: bool
+    file: Path,
+    role: Role | None,
+    units: str | None,
+    picture: Path | None,
+    recover: bool,
+    force: bool,
+    pairs: list[str],
+    as_json: bool,
 ) -> int:
     from sicp_cam.cli.inspect_lines import inspect_lines
-    from sicp_cam.job.layers import settings
-    from sicp_cam.limits import Limits
-    from sicp_cam.options.values import table
+    from sicp_cam.cli.reader_settings import reader_settings
     from sicp_cam.units import mm_per_unit
 
     if units is not None:
         mm_per_unit(units)
-    chosen = role or _role(file)
-    options: dict[str, object] = {}
-    caps: dict[str, object] = {}
-    for key, value in settings({}, pairs).values.items():
-        own_key = key.removeprefix(f"options.{chosen}.")
-        if own_key.startswith("limits."):
-            caps[own_key.removeprefix("limits.")] = value
-        else:
-            options[own_key] = value
-    limits, problems = table(Limits, caps)
-    if limits is None:
-        raise JobError(*(f"limits.{key}: {problem}" for key, problem in problems.items()))
+    chosen = role or _role(file, units, pairs)
+    limits, tables = reader_settings(pairs, [chosen])
 
     from sicp_cam import inspection
 
     document = inspection.inspect(
-        file, role=chosen, units=units, options=options, picture=picture, force=force, limits=limits
+        file,
+        role=chosen,
+        units=units,
+        options=tables[chosen],
+        picture=picture,
+        recover=recover,
+        force=force,
+        limits=limits,
     )
     if as_json:
         say_json(document)
@@ -93,19 +97,13 @@ def _run(
     return 0
 
 
-def _role(file: Path) -> str:
-    from sicp_cam.job.input_files import absent, is_pose
+def _role(file: Path, units: str | None, pairs: list[str]) -> str:
+    from sicp_cam.cli.reader_settings import reader_settings
     from sicp_cam.plugins import roles
+    from sicp_cam.roles import role_of
 
-    name = printable(str(file))
-    if not file.exists():
-        raise InputError(f"{name}: {absent(file)}")
-    if is_pose(file):
-        raise InputError(f"{name}: this is a pose, a 4x4 matrix; give it with --align")
-    possible = roles(file)
-    if len(possible) == 1:
-        return possible[0]
-    if not possible:
-        job = "; if it is a job, give it to sicp-cam correct" if file.suffix.lower() == ".toml" else ""
-        raise InputError(f"{name}: nothing reads this suffix; see sicp-cam plugins{job}")
-    raise JobError(f"{name}: may be a {' or a '.join(possible)}; say which with --role")
+    named = [name for name in roles(file) if any(pair.startswith(f"{name}.") for pair in pairs)]
+    if len(named) == 1:
+        return named[0]
+    limits, _ = reader_settings(pairs, ["options"])
+    return role_of(file, units=units, limits=limits)

@@ -7,7 +7,7 @@ from typing import Any
 
 from sicp_cam.errors import printable
 
-__all__ = ["inspect_lines"]
+__all__ = ["finding_line", "inspect_lines", "unit_words"]
 
 _TEXT = 1000
 
@@ -22,11 +22,11 @@ def inspect_lines(document: Mapping[str, Any]) -> Iterator[str]:
     """
     for key in ("role", "path", "sha256", "format"):
         yield f"{key}: {printable(document[key], _TEXT)}"
-    yield f"unit: {_unit(document)}"
+    yield f"unit: {unit_words(document)}"
     low, high = document["bounds"]["min_mm"], document["bounds"]["max_mm"]
     yield f"bounds: {_numbers(low)} to {_numbers(high)} mm"
     yield from _BODIES[document["role"]](document)
-    yield from _listed("findings", (_finding(finding) for finding in document["findings"]))
+    yield from _listed("findings", (finding_line(finding) for finding in document["findings"]))
 
 
 def _part(document: Mapping[str, Any]) -> Iterator[str]:
@@ -38,6 +38,7 @@ def _scan(document: Mapping[str, Any]) -> Iterator[str]:
     yield f"points: {document['count']}"
     yield f"triangles: {document['triangles'] or 'none'}"
     yield f"normals: {'yes' if document['normals'] else 'none'}"
+    yield f"columns: {printable(', '.join(document['columns']), _TEXT) or 'none'}"
     spacing = document["spacing_mm"]
     yield f"spacing: {'not known, too few points' if spacing is None else f'{_number(spacing)} mm'}"
     loops = (
@@ -61,7 +62,8 @@ def _path(document: Mapping[str, Any]) -> Iterator[str]:
 _BODIES = {"part": _part, "scan": _scan, "path": _path}
 
 
-def _unit(document: Mapping[str, Any]) -> str:
+def unit_words(document: Mapping[str, Any]) -> str:
+    """Say what unit the numbers of an input have, and whether it says so."""
     if document.get("unit_stated", True):
         return str(document["units"])
     return f"not stated: {document['units']} assumed (say it with --units)"
@@ -79,7 +81,8 @@ def _contour(contour: Mapping[str, Any]) -> str:
     return f"{contour['number']}: {contour['kind']}, {', '.join(words)}"
 
 
-def _finding(finding: Mapping[str, Any]) -> str:
+def finding_line(finding: Mapping[str, Any]) -> str:
+    """Return a finding as one line."""
     where = f"{finding['where']}: " if finding["where"] else ""
     return printable(f"{finding['level']} {finding['code']}: {where}{finding['message']}", _TEXT)
 

@@ -29,7 +29,7 @@ def plugins(
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
     talk: Talk = Talk(),  # noqa: B008  # frozen
 ) -> int:
-    """List the readers of scans, parts and paths, and the postprocessors, with the distributions they come from.
+    """List readers and writers of scans, parts and paths, and postprocessors, with the distributions they come from.
 
     With a name, list the options of that one instead, with types, defaults and the flag that sets each.
 
@@ -74,11 +74,12 @@ def _listed(check: bool, as_json: bool) -> int:
 
 
 def _table(found: Iterable[Plugin]) -> Iterator[str]:
-    from sicp_cam.plugins.registry import POSTPROCESSORS
+    from sicp_cam.plugins.registry import POSTPROCESSORS, WRITERS
 
+    kinds = {POSTPROCESSORS: "post", WRITERS: "write {}"}
     rows = [
         (
-            "post" if plugin.group == POSTPROCESSORS else plugin.name.partition(".")[0],
+            kinds.get(plugin.group, "{}").format(plugin.name.partition(".")[0]),
             plugin.name if plugin.group == POSTPROCESSORS else f".{plugin.name.partition('.')[2]}",
             plugin.value,
             plugin.owner + (" (override)" if plugin.override else ""),
@@ -126,12 +127,14 @@ def _description(one: PluginOptions) -> Iterator[str]:
     from sicp_cam.errors import printable
 
     plugin = one.plugin
-    kind = "postprocessor" if one.role == "post" else f"reader of a {one.role}"
+    role = plugin.name.partition(".")[0]
+    kind = {"post": "postprocessor", "out": f"writer of a {role}"}.get(one.role, f"reader of a {role}")
     yield f"{plugin.name}: {kind}, {plugin.value}, from {plugin.owner}"
     if one.summary:
         yield printable(one.summary)
     if one.options:
-        yield f"on the command line as below, in a job file in the table [options.{one.prefix}]:"
+        where = f"as below, in a job file in the table [options.{one.prefix}]" if one.role != "out" else "of convert"
+        yield f"on the command line {where}:"
     yield from option_lines(one.options, f"--set {one.prefix}.")
     if one.any_option:
         yield "it takes options by name and does not list them; see its own documentation"

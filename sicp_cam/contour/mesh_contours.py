@@ -1,10 +1,14 @@
-"""Contours of a part that is known as triangles only: the loops along which its mesh is open."""
+"""Contours of a part that is known as triangles only: where its mesh is open, or where a closed one has edges."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from sicp_cam.contour.boundary import mesh_boundary_edges
+from sicp_cam.contour.face_regions import face_regions
 from sicp_cam.contour.frames import orthonormal
 from sicp_cam.contour.loops import mesh_loops
 from sicp_cam.model import Contour, FloatArray, IntArray, TriangleMesh
@@ -18,10 +22,18 @@ RING_STEP_MM = 4.0
 PIECE_MM = 8.0
 CANDIDATES = 12
 OFF_SURFACE_MM = 2.0
+WELD_ULPS = 4.0
+"""How far apart equal vertices may lie, in units of the last place of the largest coordinate as a 32-bit number."""
+LEAST_LOOP_MM = 3.0
+"""Shorter loops on a closed mesh are roughness; no tool goes around them."""
 
 
 def mesh_contours(mesh: TriangleMesh) -> tuple[Contour, ...]:
-    """Return the open boundary loops of a mesh as contours, longest first.
+    """Return the boundary loops of a mesh as contours, longest first.
+
+    An open mesh ends at its open edges. A watertight one is taken apart where its surface turns by more than 30
+    degrees, and each of these regions ends at its own edges: a plate with a hole gives the outline and the hole on
+    either skin, and the edges of the walls between them, each with the normals of its own region.
 
     The sides of the polygon are followed exactly and sampled at steps of at most 1 mm; a tangent is smoothed over its
     neighbours except at corners. Normals are those of the faces at the boundary.
@@ -29,12 +41,60 @@ def mesh_contours(mesh: TriangleMesh) -> tuple[Contour, ...]:
     Parameters
     ----------
     mesh
-        Faces wound counter-clockwise as seen from outside, equal vertices merged. A watertight mesh has no contour.
+        Faces wound counter-clockwise as seen from outside, equal vertices merged. Boundary vertices that only the
+        rounding of 32-bit numbers keeps apart count as equal. A watertight mesh may be inside out; it has no contour
+        if it has no sharp edge.
     """
+    mesh = _welded(mesh)
     face_normals = _face_normals(mesh)
     loops = [(index, closed) for index, closed in mesh_loops(mesh.faces) if len(index) >= 3]
     contours = [_contour(mesh, face_normals, index, closed) for index, closed in loops]
+    if not contours and len(mesh.faces):
+        return _region_contours(mesh)
     return tuple(sorted(contours, key=lambda contour: -contour.length_mm))
+
+
+def _welded(mesh: TriangleMesh) -> TriangleMesh:
+    """Close seams along which the vertices of two faces differ by rounding: they would seem to be open edges."""
+    rim = np.unique(mesh_boundary_edges(mesh.faces))
+    if not len(rim):
+        return mesh
+    points = mesh.vertices_mm[rim]
+    reach = WELD_ULPS * float(np.spacing(np.float32(np.abs(mesh.vertices_mm).max())))
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    if not len(pairs):
+        return mesh
+    same = coo_array((np.ones(len(pairs), dtype=np.bool_), pairs.T), shape=(len(rim), len(rim)))
+    _, label = connected_components(same, directed=False)
+    _, first = np.unique(label, return_index=True)
+    number = np.arange(len(mesh.vertices_mm))
+    number[rim] = rim[first[label]]
+    faces = number[mesh.faces]
+    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return TriangleMesh(mesh.vertices_mm, faces[whole], mesh.normals)
+
+
+def _region_contours(mesh: TriangleMesh) -> tuple[Contour, ...]:
+    contours = [
+        _contour(region.mesh, region.normals, index, closed)
+        for region in face_regions(mesh)
+        for index, closed in mesh_loops(region.mesh.faces)
+        if len(index) >= 3 and _way_around_mm(region.mesh, index) >= LEAST_LOOP_MM
+    ]
+    return tuple(sorted(contours, key=_order))
+
+
+def _way_around_mm(mesh: TriangleMesh, index: IntArray) -> float:
+    points = mesh.vertices_mm[index]
+    return float(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).sum())
+
+
+def _order(contour: Contour) -> tuple[float, ...]:
+    """Return the sort key: longest first, then by position, rounded so that equal loops keep their order."""
+    points = contour.points_mm
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    normal = contour.normals.mean(axis=0)
+    return (-round(contour.length_mm, 3), *np.round(middle, 3).tolist(), *np.round(normal, 3).tolist())
 
 
 def _contour(mesh: TriangleMesh, face_normals: FloatArray, index: IntArray, closed: bool) -> Contour:
@@ -106,6 +166,8 @@ def _rings(
     low, high = wanted.min(axis=0) - PIECE_MM, wanted.max(axis=0) + PIECE_MM
     corners = mesh.vertices_mm[mesh.faces]
     near = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
+    if not len(near):
+        return np.zeros((0, 3)), np.zeros((0, 3))
     vertices, faces, owner = trimesh.remesh.subdivide_to_size(
         mesh.vertices_mm, mesh.faces[near], PIECE_MM, max_iter=40, return_index=True
     )

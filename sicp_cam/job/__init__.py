@@ -82,6 +82,8 @@ class Job:
         Kinds of report pages; none for no report.
     force
         Replace existing results.
+    recover
+        Repair damaged inputs where that can be done; each repair is a warning.
     strict
         Let warnings end the run.
     dry_run
@@ -109,6 +111,7 @@ class Job:
     path_units: Unit | None = None
     report: tuple[Literal["pdf", "png"], ...] = ("pdf", "png")
     force: bool = False
+    recover: bool = False
     strict: bool = False
     dry_run: bool = False
     override: tuple[str, ...] = ()

@@ -58,8 +58,8 @@ def wrong_places(files: Mapping[str, Path]) -> dict[str, str]:
     dict
         What is wrong by role; of two files in each other's place the first only.
 
-    >>> wrong_places({"part": Path("scan.ply"), "scan": Path("part.step")})
-    {'part': 'scan.ply is read as a scan, not as a part: are --cad and --scan swapped?'}
+    >>> wrong_places({"part": Path("scan.asc"), "scan": Path("part.step")})
+    {'part': 'scan.asc is read as a scan, not as a part: are --cad and --scan swapped?'}
     """
     readable = {role: roles(path) for role, path in files.items()}
     wrong: dict[str, str] = {}
@@ -67,10 +67,11 @@ def wrong_places(files: Mapping[str, Path]) -> dict[str, str]:
     for role, known in readable.items():
         if role in known or not known or role in paired:
             continue
-        swapped = [other for other in known if role in readable.get(other, ()) and other not in readable[other]]
+        swapped = [other for other in known if role in readable.get(other, ())]
         paired.update(swapped)
         flag = FLAGS[role]
-        advice = f": are {flag} and {FLAGS[swapped[0]]} swapped?" if swapped else f"; give another file with {flag}"
+        both = " and ".join(FLAGS[each] for each in FLAGS if each in (role, *swapped[:1]))
+        advice = f": are {both} swapped?" if swapped else f"; give another file with {flag}"
         wrong[role] = f"{printable(str(files[role]))} is read as {_either(known)}, not as a {role}{advice}"
     return wrong
 

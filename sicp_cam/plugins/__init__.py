@@ -16,12 +16,24 @@ from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.options.help import annotations_of
 from sicp_cam.options.values import converted, nearest
 from sicp_cam.plugins.options import keyword_names, takes_any
-from sicp_cam.plugins.registry import FORMATS, POSTPROCESSORS, ROLES, owner, owners
+from sicp_cam.plugins.registry import FORMATS, POSTPROCESSORS, ROLES, WRITERS, owner, owners
 
 if TYPE_CHECKING:
     from sicp_cam.model import Part, Scan, ToolPath
 
-__all__ = ["check_reader", "postprocessor", "read_part", "read_path", "read_scan", "reader", "roles"]
+__all__ = [
+    "check_reader",
+    "encoded",
+    "postprocessor",
+    "posts_writing",
+    "read_part",
+    "read_path",
+    "read_scan",
+    "reader",
+    "roles",
+    "suffix_of",
+    "writable_roles",
+]
 
 _Kind = TypeVar("_Kind")
 _NO_OPTIONS: Mapping[str, object] = MappingProxyType({})
@@ -34,7 +46,24 @@ def roles(path: Path) -> tuple[str, ...]:
     ('part',)
     """
     claims = owners(FORMATS)
-    return tuple(role for role in ROLES if f"{role}{path.suffix.lower()}" in claims)
+    return tuple(role for role in ROLES if f"{role}.{suffix_of(path)}" in claims)
+
+
+def suffix_of(path: Path) -> str:
+    """Return the suffix that says what a file is: in lower case, without its dot, behind `.gz` and version numbers.
+
+    >>> suffix_of(Path("scan.PLY.gz")), suffix_of(Path("op010.ncl.3")), suffix_of(Path("part"))
+    ('ply', 'ncl', '')
+    """
+    suffixes = [suffix.removeprefix(".").lower() for suffix in path.suffixes]
+    while len(suffixes) > 1 and (suffixes[-1] == "gz" or suffixes[-1].isdigit()):
+        suffixes.pop()
+    return suffixes[-1] if suffixes else ""
+
+
+def _dotted(path: Path) -> str:
+    suffix = suffix_of(path)
+    return printable(f".{suffix}", 40) if suffix else ""
 
 
 def reader(role: str, path: Path, *, suffix: str | None = None) -> Callable[..., Any]:
@@ -58,7 +87,7 @@ def reader(role: str, path: Path, *, suffix: str | None = None) -> Callable[...,
     """
     claims = owners(FORMATS)
     known = sorted(name.removeprefix(f"{role}.") for name in claims if name.startswith(f"{role}."))
-    wanted = path.suffix.removeprefix(".").lower() if suffix is None else suffix.removeprefix(".").lower()
+    wanted = suffix_of(path) if suffix is None else suffix.removeprefix(".").lower()
     name = f"{role}.{wanted}"
     if name in claims:
         function: Callable[..., Any] = owner(claims[name]).load()
@@ -67,7 +96,8 @@ def reader(role: str, path: Path, *, suffix: str | None = None) -> Callable[...,
     if suffix is not None:
         raise JobError(f"{role}.format: no reader for '{printable(suffix, 40)}' as a {role}; {readable}")
     raise InputError(
-        f"{printable(str(path))}: no reader for a {role} with the suffix '{printable(path.suffix, 40)}'; {readable}; "
+        f"{printable(str(path))}: no reader for a {role} with the suffix "
+        f"'{_dotted(path)}'; {readable}; "
         f"or say what it is with --set {role}.format=SUFFIX"
     )
 
@@ -78,6 +108,7 @@ def read_scan(
     units: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
     options: Mapping[str, object] = _NO_OPTIONS,
+    recover: bool = False,
 ) -> Scan:
     """Read a scan with whichever plug-in knows its suffix.
 
@@ -91,6 +122,8 @@ def read_scan(
         Caps that the reader keeps.
     options
         What the reader takes by name beyond that, and `format`: the suffix to treat the file as.
+    recover
+        True to repair what can be repaired; each repair is a finding. A reader that repairs nothing reads as always.
 
     Raises
     ------
@@ -101,7 +134,7 @@ def read_scan(
     """
     from sicp_cam.model import Scan
 
-    return _read("scan", path, units, limits, options, Scan)
+    return _read("scan", path, units, limits, options, Scan, recover=recover)
 
 
 def read_part(
@@ -110,11 +143,12 @@ def read_part(
     units: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
     options: Mapping[str, object] = _NO_OPTIONS,
+    recover: bool = False,
 ) -> Part:
     """Read a nominal part; parameters and errors as in `read_scan`."""
     from sicp_cam.model import Part
 
-    return _read("part", path, units, limits, options, Part)
+    return _read("part", path, units, limits, options, Part, recover=recover)
 
 
 def read_path(
@@ -123,11 +157,12 @@ def read_path(
     units: str | None = None,
     limits: Limits = DEFAULT_LIMITS,
     options: Mapping[str, object] = _NO_OPTIONS,
+    recover: bool = False,
 ) -> ToolPath:
     """Read a tool path; parameters and errors as in `read_scan`."""
     from sicp_cam.model import ToolPath
 
-    return _read("path", path, units, limits, options, ToolPath)
+    return _read("path", path, units, limits, options, ToolPath, recover=recover)
 
 
 def check_reader(role: str, path: Path, options: Mapping[str, object] = _NO_OPTIONS) -> None:
@@ -139,6 +174,66 @@ def check_reader(role: str, path: Path, options: Mapping[str, object] = _NO_OPTI
         As `read_scan` does for the same reasons.
     """
     _ready(role, path, options)
+
+
+def writable_roles(path: Path) -> tuple[str, ...]:
+    """Return the roles, of those that are not programs, that can be written into a file with this suffix.
+
+    >>> writable_roles(Path("scan.pcd"))
+    ('scan',)
+    """
+    claims = owners(WRITERS)
+    return tuple(role for role in ROLES if f"{role}.{suffix_of(path)}" in claims)
+
+
+def encoded(
+    role: str, path: Path, thing: Scan | Part, *, unit: str = "mm", options: Mapping[str, object] = _NO_OPTIONS
+) -> bytes:
+    """Return a scan or part as the bytes of a file, by whichever plug-in writes its suffix.
+
+    Parameters
+    ----------
+    role
+        `scan` or `part`.
+    path
+        The file; only its suffix matters, and nothing is written.
+    thing
+        What is to be written.
+    unit
+        Unit of the numbers in the file.
+    options
+        What the writer takes by name.
+
+    Raises
+    ------
+    JobError
+        If no writer is known for the suffix, an option is wrong, or the format cannot hold what is given.
+    """
+    claims = owners(WRITERS)
+    name = f"{role}.{suffix_of(path)}"
+    if name not in claims:
+        known = ", ".join(sorted(each.partition(".")[2] for each in claims if each.startswith(f"{role}.")))
+        raise JobError(
+            f"{printable(str(path))}: nothing writes a {role} with the suffix '{_dotted(path)}';"
+            f" writable: {known or 'none'}"
+        )
+    function = owner(claims[name]).load()
+    content: bytes = function(thing, unit=unit, **_arguments("out", function, options))
+    return content
+
+
+def posts_writing(path: Path) -> list[str]:
+    """Return the names of the postprocessors that write files with this suffix, the one of that name first.
+
+    Raises
+    ------
+    JobError
+        If a postprocessor cannot be imported.
+    """
+    suffix = suffix_of(path)
+    claims = owners(POSTPROCESSORS)
+    loaded = {name: getattr(owner(each).load(), "suffix", "") for name, each in sorted(claims.items())}
+    return sorted((name for name, wrote in loaded.items() if wrote == f".{suffix}"), key=lambda name: name != suffix)
 
 
 def postprocessor(name: str, options: Mapping[str, object] = _NO_OPTIONS) -> Any:
@@ -156,9 +251,18 @@ def postprocessor(name: str, options: Mapping[str, object] = _NO_OPTIONS) -> Any
 
 
 def _read(
-    role: str, path: Path, units: str | None, limits: Limits, options: Mapping[str, object], kind: type[_Kind]
+    role: str,
+    path: Path,
+    units: str | None,
+    limits: Limits,
+    options: Mapping[str, object],
+    kind: type[_Kind],
+    *,
+    recover: bool,
 ) -> _Kind:
     function, arguments = _ready(role, path, options)
+    if recover and "recover" in inspect.signature(function).parameters:
+        arguments["recover"] = True
     result = function(path, units=units, limits=limits, **arguments)
     if not isinstance(result, kind):
         raise JobError(
@@ -185,7 +289,8 @@ def _arguments(role: str, function: Callable[..., Any], options: Mapping[str, ob
     arguments, problems = {}, []
     for key, value in options.items():
         if key not in known and (not takes_any(function) or key in taken):
-            problems.append(f"{role}.{printable(key)}: unknown option; {nearest(key, [*known, 'format'])}")
+            near = nearest(key, known if role == "out" else [*known, "format"])
+            problems.append(f"{role}.{printable(key)}: unknown option; {near}")
             continue
         try:
             arguments[key] = converted(value, hints.get(key, object) if key in known else object)

@@ -10,11 +10,11 @@ from typing import Any
 from sicp_cam.errors import JobError, printable
 from sicp_cam.options.help import Option, dataclass_options, function_options, summary
 from sicp_cam.options.values import nearest
-from sicp_cam.plugins.registry import FORMATS, POSTPROCESSORS, ROLES, Plugin, owner, owners
+from sicp_cam.plugins.registry import FORMATS, POSTPROCESSORS, ROLES, WRITERS, Plugin, owner, owners
 
 __all__ = ["PluginOptions", "keyword_names", "plugin_options", "takes_any", "with_name"]
 
-_GIVEN_BY_US = ("units", "limits")
+_GIVEN_BY_US = ("units", "limits", "recover", "unit")
 _FORMAT = Option("format", "text", "none", "Suffix to treat the file as, where its own one does not tell what it is.")
 
 
@@ -27,7 +27,7 @@ class PluginOptions:
     plugin
         Which one.
     role
-        One of `ROLES`, or `post`.
+        One of `ROLES`, `post`, or `out` for a writer.
     summary
         What it is, in one line.
     options
@@ -56,13 +56,13 @@ def with_name(name: str) -> tuple[Plugin, ...]:
     JobError
         If there is none, with the nearest name; or if two distributions claim it.
     """
-    claims = {**owners(FORMATS), **owners(POSTPROCESSORS)}
+    groups = [owners(group) for group in (FORMATS, WRITERS, POSTPROCESSORS)]
     suffix = name.removeprefix(".").lower()
-    wanted = [name, name.lower(), *(f"{role}.{suffix}" for role in ROLES)]
-    found = {key: owner(claims[key]) for key in dict.fromkeys(wanted) if key in claims}
+    wanted = dict.fromkeys([name, name.lower(), *(f"{role}.{suffix}" for role in ROLES)])
+    found = [owner(claims[key]) for key in wanted for claims in groups if key in claims]
     if not found:
-        raise JobError(f"no plug-in '{printable(name, 60)}'; {nearest(name, claims)}")
-    return tuple(found.values())
+        raise JobError(f"no plug-in '{printable(name, 60)}'; {nearest(name, {key for each in groups for key in each})}")
+    return tuple(found)
 
 
 def plugin_options(plugin: Plugin) -> PluginOptions:
@@ -77,6 +77,10 @@ def plugin_options(plugin: Plugin) -> PluginOptions:
     if plugin.group == FORMATS:
         taken = (_FORMAT, *function_options(thing, keyword_names(thing)))
         return PluginOptions(plugin, plugin.name.partition(".")[0], summary(thing), taken, takes_any(thing))
+    if plugin.group == WRITERS:
+        return PluginOptions(
+            plugin, "out", summary(thing), function_options(thing, keyword_names(thing)), takes_any(thing)
+        )
     kind = getattr(thing, "Options", None)
     told = str(getattr(thing, "summary", "") or summary(thing))
     if isinstance(kind, type) and is_dataclass(kind):

@@ -1,8 +1,10 @@
 """Which distributions offer readers and postprocessors, as registered; loads one when it is asked for.
 
 Entry-point group `sicp_cam.formats`: the name is `role.suffix` with a role of `ROLES`, the value a function
-`read(path, *, units, limits, **options)`. Group `sicp_cam.postprocessors`: the value is a `Postprocessor` class.
-A name that another distribution owns is taken over only through the group with `.override` appended.
+`read(path, *, units, limits, **options)`; one that can repair damaged files also takes `recover`. Group
+`sicp_cam.writers`: `role.suffix` with the role scan or part, the value a function `write(thing, *, unit, **options)`
+that returns bytes. Group `sicp_cam.postprocessors`: the value is a `Postprocessor` class. A name that another
+distribution owns is taken over only through the group with `.override` appended.
 """
 
 from __future__ import annotations
@@ -14,10 +16,11 @@ from typing import Any
 from sicp_cam.errors import JobError, printable
 from sicp_cam.findings import Finding, Level
 
-__all__ = ["FORMATS", "POSTPROCESSORS", "ROLES", "Plugin", "broken", "listing", "owner", "owners"]
+__all__ = ["FORMATS", "POSTPROCESSORS", "ROLES", "WRITERS", "Plugin", "broken", "listing", "owner", "owners"]
 
 FORMATS = "sicp_cam.formats"
 POSTPROCESSORS = "sicp_cam.postprocessors"
+WRITERS = "sicp_cam.writers"
 ROLES = ("scan", "part", "path")
 
 
@@ -28,7 +31,7 @@ class Plugin:
     Parameters
     ----------
     group
-        `FORMATS` or `POSTPROCESSORS`.
+        `FORMATS`, `WRITERS` or `POSTPROCESSORS`.
     name
         `role.suffix`, or the name of a post.
     value
@@ -67,7 +70,7 @@ def listing() -> tuple[tuple[Plugin, ...], tuple[Finding, ...]]:
     """Return every registered plug-in, in order of name, and what is wrong with the registration; imports none."""
     plugins: list[Plugin] = []
     findings: list[Finding] = []
-    for group in (FORMATS, POSTPROCESSORS):
+    for group in (FORMATS, WRITERS, POSTPROCESSORS):
         for name, claims in sorted(owners(group).items()):
             plugins += claims
             findings += _registration_findings(group, name, claims)
@@ -92,7 +95,7 @@ def owners(group: str) -> dict[str, list[Plugin]]:
     for override in (False, True):
         for entry in registered.select(group=f"{group}.override" if override else group):
             dist = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown distribution"
-            name = entry.name.lower() if group == FORMATS else entry.name
+            name = entry.name if group == POSTPROCESSORS else entry.name.lower()
             claims.setdefault(name, []).append(Plugin(group, name, entry.value, dist, override))
     return claims
 
@@ -130,7 +133,7 @@ def _registration_findings(group: str, name: str, claims: list[Plugin]) -> list[
     except JobError as error:
         findings.append(Finding(801, Level.WARN, str(error), name))
     role, _, suffix = name.partition(".")
-    if group == FORMATS and (role not in ROLES or not suffix):
+    if group != POSTPROCESSORS and (role not in ROLES or not suffix):
         message = f"{name} from {claims[0].owner}: not of the form role.suffix with role {', '.join(ROLES)}; never used"
         findings.append(Finding(804, Level.WARN, message, name))
     return findings

@@ -42,6 +42,8 @@ class CorrectedPath:
         The same moves in the scan frame: by the rigid pose alone, and by the corrected contour.
     status
         One per move.
+    source_moves
+        (n,) move of the path as given that each move ends or is a part of.
     added
         (n,) True for moves that are not in the source.
     feed_distance_mm
@@ -55,6 +57,7 @@ class CorrectedPath:
     rigid: ToolPath
     corrected: ToolPath
     status: tuple[Status, ...]
+    source_moves: IntArray
     added: BoolArray
     feed_distance_mm: FloatArray = field(default_factory=lambda: np.zeros(0))
     u_mm: FloatArray | None = None
@@ -102,7 +105,8 @@ def correct_path(
     s_mm = _places(nominal, follows, contours)
     status, u_mm = _status(cuts, s_mm, follows, contours), _uncertainty(cuts, s_mm, follows, contours)
     distance = assignment.distance_mm[~path.rapid[source]]
-    return CorrectedPath(nominal, rigid, corrected, status, steps.fraction[kept] < 1.0, distance, u_mm)
+    added = steps.fraction[kept] < 1.0
+    return CorrectedPath(nominal, rigid, corrected, status, source[kept], added, distance, u_mm)
 
 
 def carried(

@@ -27,6 +27,7 @@ DOCUMENT = {
     "triangles": 0,
     "normals": False,
     "spacing_mm": None,
+    "columns": [],
     "loops": [],
     "findings": [{"code": 101, "level": "info", "message": "odd\x1b", "where": "line 3"}],
 }
@@ -46,7 +47,18 @@ def asked(stand_in):
 
 def test_inspect_hands_on_what_is_asked(run, files, asked):
     Path("points.csv").write_bytes(b"x")
-    words = ["--units", "inch", "--picture", "p.png", "--force", "--set", "decimal=,", "--set", "scan.columns=x,y,z"]
+    words = [
+        "--units",
+        "inch",
+        "--picture",
+        "p.png",
+        "--force",
+        "--recover",
+        "--set",
+        "decimal=,",
+        "--set",
+        "scan.columns=x,y,z",
+    ]
     code, out, err = run("inspect", "points.csv", "--role", "scan", *words, "--set", "limits.points=9")
     assert (code, err) == (0, "")
     assert asked == [
@@ -57,6 +69,7 @@ def test_inspect_hands_on_what_is_asked(run, files, asked):
                 "units": "inch",
                 "options": {"decimal": ",", "columns": "x,y,z"},
                 "picture": Path("p.png"),
+                "recover": True,
                 "force": True,
                 "limits": Limits(points=9),
             },
@@ -72,6 +85,7 @@ def test_inspect_hands_on_what_is_asked(run, files, asked):
         "points: 3",
         "triangles: none",
         "normals: none",
+        "columns: none",
         "spacing: not known, too few points",
         "loops: none",
         "findings: 1",
@@ -118,13 +132,13 @@ def test_inspect_tells_of_a_path_in_its_own_words():
     assert {"feeds: none", "events: none"} <= set(told)
 
 
-def test_inspect_finds_the_role_or_asks_for_it(run, files, asked):
+def test_inspect_finds_the_role(run, files, asked):
     assert run("inspect", "part.step", "--json")[:2] == (0, json.dumps(DOCUMENT, indent=2) + "\n")
     assert asked[0][1]["role"] == "part"
     for name in ("mesh.stl", "movie.mp4", "job.toml"):
         Path(name).write_bytes(b"x")
-    code, _, err = run("inspect", "mesh.stl")
-    assert (code, err) == (2, "sicp-cam: error: mesh.stl: may be a scan or a part; say which with --role\n")
+    assert run("inspect", "mesh.stl", "--json")[0] == 0
+    assert asked[1][1]["role"] == "scan"
     code, _, err = run("inspect", "movie.mp4")
     assert (code, err) == (3, "sicp-cam: error: movie.mp4: nothing reads this suffix; see sicp-cam plugins\n")
     assert "if it is a job, give it to sicp-cam correct" in run("inspect", "job.toml")[2]
@@ -197,12 +211,13 @@ def test_a_name_that_several_have_tells_of_all(run, files):
     assert [(one["role"], one["name"]) for one in document["plugins"]] == [
         ("post", "csv"),
         ("scan", "scan.csv"),
+        ("out", "scan.csv"),
         ("path", "path.csv"),
     ]
     assert document["plugins"][0]["options"] is not None
     flags = {option["name"]: option["flag"] for option in document["plugins"][1]["options"]}
     assert flags["decimal"] == "--set scan.decimal=..."
-    assert run("plugins", ".ply")[1] == run("plugins", "scan.ply")[1]
+    assert run("plugins", ".dxf")[1] == run("plugins", "path.dxf")[1]
 
 
 @pytest.mark.parametrize(

@@ -208,7 +208,7 @@ def test_flags_beat_variables_and_those_the_job_file(run, files, pipeline, tmp_p
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [
-        (["--scan", "scan.e57"], 3, "scan.e57: no reader for a scan with the suffix '.e57'"),
+        (["--scan", "scan.mp4"], 3, "scan.mp4: no reader for a scan with the suffix '.mp4'"),
         (["--set", "path.chrd_mm=1"], 2, "path.chrd_mm: unknown option; did you mean chord_mm?"),
         (["--set", "post.csv.decimals=1"], 2, "csv has no option 'decimals'"),
         (["--cad", "scan.ply", "--scan", "part.step"], 2, "are --cad and --scan swapped?"),
@@ -216,7 +216,7 @@ def test_flags_beat_variables_and_those_the_job_file(run, files, pipeline, tmp_p
 )
 def test_what_the_job_alone_shows_is_told_before_a_file_is_read(run, files, tmp_path, words, code, told):
     """The files hold nothing that could be read, and the error is none of theirs."""
-    (tmp_path / "scan.e57").write_bytes(b"x")
+    (tmp_path / "scan.mp4").write_bytes(b"x")
     changed = dict(zip(files[::2], files[1::2], strict=True))
     for flag in words[::2]:
         changed.pop(flag, None)

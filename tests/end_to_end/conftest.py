@@ -29,6 +29,7 @@ def inputs(name):
 def words(name, out, **changes):
     """Return the words of a run with one job, its options from `changes`; None leaves one out."""
     stated = {**inputs(name), "align": SAMPLES / name / "pose_rough.txt", "name": name, "post": "csv", "report": "none"}
+    stated["scan-units"] = "mm"
     stated |= {key.replace("_", "-"): value for key, value in changes.items()}
     return ["correct", *(str(w) for k, v in stated.items() if v is not None for w in (f"--{k}", v)), "--out", str(out)]
 

@@ -72,7 +72,7 @@ def test_a_contour_that_the_part_does_not_have_is_exit_2(refused, disc):
         ("path", "path.nc", b"", "empty"),
         ("path", "path.nc", b"%\nG21 G90\nG1 X1.0 X2.0 F100\n%\n", "line 3"),
         ("path", "path.apt", b"UNITS/MM\nGOTO/1.0,2.0\n", "line 2"),
-        ("scan", "scan.e57", b"anything", "suffix"),
+        ("scan", "scan.mp4", b"anything", "suffix"),
     ],
 )
 def test_an_input_that_cannot_be_used_is_exit_3(refused, disc, bench, tmp_path, role, name, content, told):
@@ -91,7 +91,7 @@ def test_an_input_that_cannot_be_used_is_exit_3(refused, disc, bench, tmp_path, 
 )
 def test_a_scan_in_another_unit_is_exit_3_and_the_unit_is_named(refused, disc, disc_points, tmp_path, factor, unit):
     file = as_text(tmp_path / "scan.xyz", disc_points * factor)
-    assert f"--scan-units {unit}" in refused(3, *disc(scan=file))
+    assert f"--scan-units {unit}" in refused(3, *disc(scan=file, scan_units=None))
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(0.001, "m"), (1.0 / 25.4, "inch")])
@@ -338,6 +338,13 @@ def test_a_run_without_warnings_passes_strict(cli, disc, tmp_path):
     done = cli(*disc(), "--strict")
     assert (done.code, done.err) == (0, "")
     assert (tmp_path / "out" / "result.json").exists()
+
+
+def test_a_unit_that_no_one_stated_is_a_warning(cli, refused, disc):
+    done = cli(*disc(scan_units=None), "--dry-run", "--json")
+    (told,) = [finding for finding in json.loads(done.out)["findings"] if finding["code"] == 409]
+    assert told["level"] == "warn" and "mm was taken: the scan is 449.6 mm across, the part 565.7 mm" in told["message"]
+    assert "--scan-units" in refused(7, *disc(scan_units=None), "--strict")
 
 
 def test_a_dry_run_does_everything_but_write(cli, disc, bench, tmp_path):

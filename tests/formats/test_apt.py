@@ -1,5 +1,6 @@
 """The APT reader against paths whose truth is known."""
 
+import gzip
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from sicp_cam.limits import Limits
 from sicp_cam.model import EventKind, ToolPath
 from sicp_formats.apt import read_path
 
+CORPUS = Path(__file__).parents[1] / "corpus" / "apt"
 HEAD = "UNITS/MM\nFEDRAT/600,MMPM\n"
 
 
@@ -200,6 +202,147 @@ def test_dwell_and_surface_speed(tmp_path: Path) -> None:
         (EventKind.DWELL, 1.5), (EventKind.SPINDLE, 600), (EventKind.DWELL, 0.5), (EventKind.OTHER, 0),
     ]  # fmt: skip
     assert codes(path) == {309}
+
+
+# --- dialects, one seed file each ---
+
+
+def test_catia(tmp_path: Path) -> None:
+    path = read_path(CORPUS / "catia.aptsource")
+    assert codes(path) == {306}
+    assert path.name == "PART TO BE MACHINED"
+    assert path.tips_mm[0].tolist() == [20.4, 0, 60]
+    assert np.allclose(path.axes[1], [0.6, 0, 0.8])
+    arc = path.tips_mm[1:-1]
+    assert np.abs(np.linalg.norm(arc - [25, 0, -30], axis=1) - 4.6).max() < 1e-9
+    assert (np.diff(arc[:, 2]) > 0).all()
+    assert np.allclose(path.axes[2:-1], [0.6, 0, 0.8])
+    assert np.allclose(path.axes[-1], [0, 0.6, 0.8])
+    assert path.rapid.tolist() == [True] + [False] * (len(path) - 1)
+    texts = [e.text for e in path.events]
+    assert "Généré le 14 mai" in texts
+    assert [(e.kind, e.value) for e in path.events if e.kind in ("tool", "spindle")] == [
+        (EventKind.TOOL, 1), (EventKind.SPINDLE, 9000), (EventKind.SPINDLE, 0),
+    ]  # fmt: skip
+
+
+def test_nx() -> None:
+    path = read_path(CORPUS / "nx.cls", units="mm")
+    assert codes(path) == {306}
+    assert path.name == "EDGE_1"
+    on_arc = path.tips_mm[(path.lines == 17)]
+    assert np.abs(np.linalg.norm(on_arc, axis=1) - 10).max() < 1e-9
+    assert (on_arc[:, 1] > 0).all()  # the short way, clockwise about -z
+    assert np.allclose(path.axes[-2:], [-0.6, 0, 0.8])  # the axis is modal
+    assert set(path.feeds_mm_min.tolist()) == {0, 800}
+    assert any(e.kind is EventKind.OTHER and e.text.startswith("TLDATA/MILL") for e in path.events)
+
+
+def test_solidworks() -> None:
+    path = read_path(CORPUS / "solidworks.apt")
+    assert codes(path) == {306}
+    assert np.allclose(path.tips_mm[0], [25.4, -12.7, 12.7])
+    assert np.allclose(path.tips_mm[-1], [-12.7, 25.4, 12.7])
+    assert path.feeds_mm_min[1] == pytest.approx(508)
+    assert path.original is not None
+    assert path.original.suffix == ".apt"
+
+
+def test_camworks_needs_the_user_to_decide() -> None:
+    with pytest.raises(FormatError, match=r"line 5: CUTCOM: .*path\.cutcom=ignore"):
+        read_path(CORPUS / "camworks.clt", cycles="points")
+    with pytest.raises(FormatError, match=r"line 16: CYCLE: .*path\.cycles=points"):
+        read_path(CORPUS / "camworks.clt", cutcom="ignore")
+    path = read_path(CORPUS / "camworks.clt", cutcom="ignore", cycles="points")
+    assert codes(path) == {306, 323, 324}
+    assert {f.level for f in path.findings if f.code > 306} == {Level.WARN}
+    assert path.tips_mm[-2:].tolist() == [[20, 0, 0], [30, 0, 0]]
+    kept = [e.text for e in path.events if e.kind is EventKind.OTHER]
+    assert kept == ["CUTCOM/LEFT,XYPLAN", "CUTCOM/OFF", "CYCLE/DRILL,5.,400.,MMPM,1.", "CYCLE/OFF"]
+
+
+def test_creo_lists_points_of_an_arc() -> None:
+    with pytest.raises(FormatError, match=r"line 21: .*same circle.*path\.arc_points=arc or straight"):
+        read_path(CORPUS / "creo.ncl")
+    arc = read_path(CORPUS / "creo.ncl", arc_points="arc")
+    on_arc = arc.tips_mm[2:-1]
+    assert np.abs(np.linalg.norm(on_arc, axis=1) - 10).max() < 1e-8
+    assert np.linalg.norm(np.diff(on_arc, axis=0), axis=1).sum() == pytest.approx(10 * np.pi, rel=1e-3)
+    assert np.allclose(arc.axes[-1], [0, 0.6, 0.8])
+    straight = read_path(CORPUS / "creo.ncl", arc_points="straight")
+    assert straight.tips_mm[-3:-1].tolist() == [[0, 10, 0], [-10, 0, 0]]
+
+
+def test_autodesk() -> None:
+    path = read_path(CORPUS / "autodesk.apt")
+    assert path.findings == ()
+    assert path.tips_mm.tolist() == [[0, 0, 100], [12.5, 3.25, 20], [12.5, 3.25, -1], [18, 3.25, -1], [0, 0, 100]]
+    assert path.rapid.tolist() == [True, True, False, False, True]
+    assert np.allclose(path.axes[3], [0, 0.28, 0.96])
+
+
+def test_makino_sections_and_every_layout_of_a_point() -> None:
+    path = read_path(CORPUS / "makino.cldata")
+    assert codes(path) == {305}
+    assert path.tips_mm.tolist() == [[0, 0, 50], [5, 5, 10], [5, 5, 0], [9, 5, 0], [9, 9, 0.5]]
+    assert np.allclose(path.axes, [[0, 0.6, 0.8]] * 4 + [[0, -0.6, 0.8]])
+    assert path.rapid.tolist() == [True, True, False, False, False]
+    assert "APTCL-SPEC,MAKINO-FF,1" in [e.text for e in path.events]
+
+
+# --- repairs ---
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("GOTO/0,0,0\nGOTO/1,0,0\nGOTO/2,0\n", 5, "3 numbers"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\nGOTO/2,0,$\n", 5, "file ends"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\nCIRCLE/0,0,0,0,0,1,1\n", 5, "without the GOTO"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\nCIRCLE/0,0,\n\n", 5, "CIRCLE"),
+    ],
+)
+def test_a_last_statement_that_is_cut_short_can_be_left_out(tmp_path: Path, text: str, line: int, words: str) -> None:
+    refused(tmp_path, HEAD + text, line, words, "--recover")
+    path = read(tmp_path, HEAD + text, recover=True)
+    assert path.tips_mm.tolist() == [[0, 0, 0], [1, 0, 0]]
+    assert codes(path) == {316, 350}
+    (dropped,) = [f for f in path.findings if f.code == 350]
+    assert dropped.level is Level.WARN
+    assert dropped.where.endswith("line 5")
+
+
+def test_a_damaged_motion_in_the_middle_is_never_repaired(tmp_path: Path) -> None:
+    for damaged, words in (("GOTO/1,0", "3 numbers"), ("GXTO/1,0,0", "much like GOTO"), ("GTO/1,0,0,0,0,1", "GOTO")):
+        text = HEAD + f"GOTO/0,0,0\n{damaged}\nGOTO/2,0,0\nFINI\n"
+        refused(tmp_path, text, 4, words)
+        refused(tmp_path, text, 4, words, recover=True)
+
+
+def test_a_damaged_feed_or_dwell_can_be_kept_as_text(tmp_path: Path) -> None:
+    text = HEAD + "GOTO/0,0,0\nFEDRAT/6\x010\nDELAY/x\nGOTO/1,0,0\nFEDRAT/300\nGOTO/2,0,0\nFINI\n"
+    refused(tmp_path, text, 4, "FEDRAT", "--recover")
+    path = read(tmp_path, text, recover=True)
+    assert path.feeds_mm_min.tolist() == [600, 0, 300]
+    assert codes(path) == {302, 351}
+    assert [e.text for e in path.events] == ["FEDRAT/6\x010", "DELAY/x"]
+    assert all(f.message.isprintable() for f in path.findings)
+
+
+def test_padding_after_the_end_can_be_dropped(tmp_path: Path) -> None:
+    text = HEAD + "GOTO/0,0,0\nGOTO/1,0,0\nFINI\n"
+    with pytest.raises(FormatError, match=rf"byte {len(text)}: ends with 64 NUL bytes.*--recover"):
+        read(tmp_path, text + "\0" * 64)
+    assert codes(read(tmp_path, text + "\0" * 64, recover=True)) == {352}
+
+
+def test_gzip_and_version_numbers(tmp_path: Path) -> None:
+    packed = tmp_path / "path.ncl.3.gz"
+    packed.write_bytes(gzip.compress((CORPUS / "creo.ncl").read_bytes()))
+    path = read_path(packed, arc_points="straight")
+    assert path.original is not None
+    assert path.original.suffix == ".ncl"
+    assert path.original.rewritten(path, np.arange(len(path))).content == (CORPUS / "creo.ncl").read_bytes()
 
 
 # --- arcs ---
@@ -405,6 +548,9 @@ def test_bad_options_are_job_errors(tmp_path: Path) -> None:
         {"step_mm": -1.0},
         {"frame": "x"},
         {"arc_sense": ""},
+        {"arc_points": "x"},
+        {"cutcom": "off"},
+        {"cycles": "yes"},
     ):
         with pytest.raises(JobError, match=rf"path\.{next(iter(options))}"):
             read(tmp_path, text, **options)

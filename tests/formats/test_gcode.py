@@ -9,6 +9,7 @@ from sicp_cam.errors import FormatError, JobError, UnitError
 from sicp_cam.limits import Limits
 from sicp_cam.model import EventKind, ToolPath
 from sicp_formats.gcode import read_path
+from sicp_formats.gcode.axis import angles_near, axis_from_angles
 
 HEAD = "G21 G90\n"
 START = HEAD + "G0 X0 Y0 Z0\n"
@@ -219,13 +220,17 @@ def test_block_numbers_may_wrap_but_not_restart(tmp_path: Path) -> None:
         ("G1 X1 (open\n", 3, ["unclosed"]),
         ("G1 X1 (a (b) F9\n", 3, ["nested comment"]),
         ("G1 X\n", 3, ["X word without a number"]),
-        ("G1 X1,5 F9\n", 3, ["bad character ','"]),
+        ("G1 X1,5 Y2.5 F9\n", 3, ["bad character ','"]),
         ("G1 X1 2 F9\n", 3, ["bad character"]),
         ("G1 X\u0661 F9\n", 3, ["without a number"]),
         ("#1=5\n", 3, ["variables"]),
         ("G1 X[1+2] F9\n", 3, ["expressions"]),
         ("R1=10\n", 3, ["parameters"]),
-        ("G1 X=AC(10) F9\n", 3, ["expressions"]),
+        ("G1 X=AC(10+1) F9\n", 3, ["expressions"]),
+        ("G1 X=DC(10) F9\n", 3, ["X=DC", "plain numbers"]),
+        ("G1 X10 ,R5 F9\n", 3, ["bad character ','", "path.decimal"]),
+        ("G1 Y5 L2 F9\n", 3, ["L word"]),
+        ("G44 H1 Z5\n", 3, ["G44", "tool offsets"]),
         ("O100 WHILE\n", 3, ["WHILE"]),
         ("X1\nO200\n", 4, ["O200"]),
         ("M98 P100\n", 3, ["subprograms"]),
@@ -249,6 +254,8 @@ def test_block_numbers_may_wrap_but_not_restart(tmp_path: Path) -> None:
         ("G43.5 H1\nG2 X1 I.5 J0 F9\n", 4, ["G43.5"]),
         ("A3=0 B3=0 C3=0 X1\n", 3, ["axis is (0, 0, 0)"]),
         ("G4\n", 3, ["dwell"]),
+        ("G4 P1 X2\n", 3, ["G4 needs one dwell time"]),
+        ("G4 P1. Y2\n", 3, ["G4 with coordinates"]),
         ("M3 M5\n", 3, ["M3, M4, M5"]),
     ],
 )
@@ -277,3 +284,170 @@ def test_bad_options_are_job_errors(tmp_path: Path) -> None:
     for options in ({"rotary": "AA"}, {"feed_mm_min": -1.0}, {"step_mm": 0.0}):
         with pytest.raises(JobError, match=rf"path\.{next(iter(options))}"):
             read(tmp_path, DISC, **options)
+
+
+def test_the_manner_of_a_single_word(tmp_path: Path) -> None:
+    text = START + "G1 X=AC(10) Y = 5 Z2 F9\nG91\nX=AC(3) Y=IC(1) Z1\nG90 X=IC(-2)\nG2 X1 Y8 I=AC(1) J=AC(7)\nM2"
+    path = read(tmp_path, text, step_mm=100.0)
+    assert path.tips_mm[1:4].tolist() == [[10, 5, 2], [3, 6, 3], [1, 6, 3]]
+    assert np.allclose(np.linalg.norm(path.tips_mm[4:, :2] - [1, 7], axis=1), 1)
+    turned = read(tmp_path, START + "TRAORI\nG1 X1 B=DC(30) C=ACP(10) F9\nC=IC(5) X2\nM2", rotary="BC")
+    assert np.allclose(turned.axes[2], [0.5 * np.cos(np.radians(15)), 0.5 * np.sin(np.radians(15)), 0.75**0.5])
+
+
+def test_decimal_commas_where_they_can_be_nothing_else_or_are_stated(tmp_path: Path) -> None:
+    text = "G21 G90\nG0 X0 Y0 Z0 (a, b.)\nG1 X10,5 Y-,25 F100,5 ; c, d\nX11 Z2,5\nM2"
+    path = read(tmp_path, text)
+    assert path.tips_mm.tolist() == [[0, 0, 0], [10.5, -0.25, 0], [11, -0.25, 2.5]]
+    assert path.feeds_mm_min[1] == 100.5
+    assert [event.text for event in path.events] == ["a, b.", "c, d"]
+    assert read(tmp_path, text, decimal=",").tips_mm.tolist() == path.tips_mm.tolist()
+    refused(tmp_path, text, 3, "bad character ','", "path.decimal", decimal=".")
+    with pytest.raises(JobError, match=r"path\.decimal"):
+        read(tmp_path, text, decimal="x")
+
+
+def test_words_that_cannot_move_the_tool_are_kept(tmp_path: Path) -> None:
+    text = START + (
+        'T="MILL (6); 2"\nM6\nD1\nS1=9000 M1=3\nG64 SOFT COMPCAD ADIS=0.1\nCYCLE832(0.01,_ORI,1)\nM777\n'
+        "G1 X1 F9\nM13\nM2"
+    )
+    path = read(tmp_path, text)
+    texts = [event.text for event in path.events]
+    assert 'T="MILL (6); 2" M6' in texts
+    assert {"D1", "S1=9000 M1=3", "CYCLE832(0.01,_ORI,1)", "M777", "M13"} <= set(texts)
+    assert [(f.code, f.where[-6:]) for f in path.findings] == [(308, "line 6")]
+    assert "3 statements" in path.findings[0].message
+    assert "S1=9000; M1=3; M777" in path.findings[0].message
+
+
+def test_heidenhain_iso(tmp_path: Path) -> None:
+    path = read_path(CORPUS / "heidenhain.iso", rotary="AC")
+    assert path.name == "TRIM5"
+    assert path.source is not None
+    assert path.source.unit_stated
+    assert path.tips_mm[[0, 1, -1]].tolist() == [[50, 0, 100], [50, 0, 0], [20.25, 60, 100]]
+    assert [event.text for event in path.events][:3] == [
+        "%TRIM5 G71 *",
+        "G30 G17 X-100 Y-100 Z-20",
+        "G31 G90 X+100 Y+100 Z+0",
+    ]
+    head = "%A G71 *\nN1 G00 G90 X+0 Y+0 Z+0 *\n"
+    refused(tmp_path, head + "N2 G15 X+1 *\n", 3, "G15", "Heidenhain")
+    refused(tmp_path, head + "N2 G02 X+1 I+0,5 J+0 F1 *\n", 3, "pole")
+
+
+CORPUS = Path(__file__).parents[1] / "corpus" / "gcode"
+SEEDS = [
+    ("fanuc_g43_4.nc", "AC", 8, {310, 318}, [0.1710101, 0.2961981, 0.9396926]),
+    ("fanuc_g43_5.nc", None, 6, set(), [0, 0.3420201, 0.9396926]),
+    ("siemens_traori.mpf", None, 5, {308, 318}, [0.4, 0.3, 0.8660254]),
+    ("siemens_rotary.mpf", "BC", 5, set(), [0.5072135, 0.0894354, 0.8571673]),
+    ("linuxcnc_g93.ngc", "BC", 6, set(), [0.2931688, 0.1761539, 0.9396926]),
+    ("haas_g234.nc", "BC", 5, {310, 318}, [0.1652453, 0.0954044, 0.9816272]),
+    ("three_axis_arcs.nc", None, 376, {306, 310, 311, 312, 318}, [0, 0, 1]),
+]
+
+
+@pytest.mark.parametrize(("name", "rotary", "moves", "found", "axis"), SEEDS)
+def test_programs_of_the_usual_controls(
+    name: str, rotary: str | None, moves: int, found: set[int], axis: list[float]
+) -> None:
+    path = read_path(CORPUS / name, rotary=rotary)
+    assert len(path) == moves
+    assert codes(path) == found
+    if name == "fanuc_g43_4.nc":
+        axis = [np.sin(np.radians(-20)), 0, np.cos(np.radians(-20))]
+    assert np.allclose(path.axes[-1], axis, atol=1e-6)
+
+
+@pytest.mark.parametrize("rotary", ["AC", "BC", "AB", "BA"])
+def test_angles_of_an_axis_are_the_nearest_and_give_it_back(rotary: str) -> None:
+    rng = np.random.default_rng(1)
+    for axis in rng.normal(size=(100, 3)):
+        axis /= np.linalg.norm(axis)
+        near = dict(zip("ABC", rng.uniform(-400, 400, 3), strict=True))
+        angles = angles_near(rotary, tuple(axis.tolist()), near)
+        assert np.allclose(axis_from_angles(rotary, near | angles), axis, atol=1e-12)
+        assert all(abs(angles[letter] - near[letter]) <= 180 for letter in rotary)
+        assert sum(abs(angles[letter] - near[letter]) for letter in rotary) <= 270
+        exact = {letter: near[letter] for letter in rotary}
+        back = angles_near(rotary, axis_from_angles(rotary, near), near)
+        assert np.allclose([back[x] for x in rotary], [exact[x] for x in rotary], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [  # what every reader of paths must refuse, in the words of LinuxCNC where it has them
+        ("G1 X1\n", 3, ["cannot do G1 with zero feed rate", "path.feed_mm_min"]),
+        ("G1 X1 X2 F9\n", 3, ["multiple X words on one line"]),
+        ("G2 X1 I.5 R.5 F9\n", 3, ["mixed radius-ijk format for arc"]),
+        ("G1 X1 F9 (no end\n", 3, ["unclosed comment", "close it"]),
+        ("G20\n", 3, ["the length unit changes"]),
+        ("N20 G1 X1 F9\nN10 X2\n", 4, ["N10 after N20", "--recover"]),
+        ("O100 SUB\n", 3, ["SUB"]),
+        ("#1=7\n", 3, ["variables and expressions are not evaluated"]),
+        ("TRAORI\nG1 X1 A3=0 B3=0 C3=0 F9\n", 4, ["the tool axis is (0, 0, 0)"]),
+        ("G93 G1 X1 F2\nX2\n", 4, ["F word missing with inverse time"]),
+        ("S900\nG95 G1 X1 F.2\n", 4, ["zero feed rate", "turning spindle"]),
+    ],
+)
+def test_bad_input_72_and_73(tmp_path: Path, text: str, line: int, words: list[str]) -> None:
+    refused(tmp_path, START + text, line, *words)
+
+
+def test_repeated_points_and_long_axes_are_findings(tmp_path: Path) -> None:
+    path = read(tmp_path, START + "TRAORI\nG1 X1 A3=0 B3=0 C3=2 F9\nX1\nX2\nM2")
+    assert codes(path) == {304, 307}
+    refused(tmp_path, "%\n", 1, "no move")
+    refused(tmp_path, "G0 X1 Y1 Z1\nM2\n", 1, "one point")
+
+
+def test_recover_drops_what_is_cut_and_guesses_nothing(tmp_path: Path) -> None:
+    cut = START + "G1 X1 F9\nX2 Y"
+    refused(tmp_path, cut, 4, "Y word without a number", "--recover")
+    path = read(tmp_path, cut, recover=True)
+    assert path.tips_mm[-1].tolist() == [1, 0, 0]
+    assert [(f.code, f.where[-6:]) for f in path.findings] == [(350, "line 4")]
+    # a whole number may have been a longer one
+    assert read(tmp_path, START + "G1 X1 F9\nX25", recover=True).tips_mm[-1].tolist() == [1, 0, 0]
+    assert codes(read(tmp_path, START + "G1 X1 F9\nM30", recover=True)) == set()
+    joined = START + "N20 G1 X1 F9\nN10 X2\nM2\n"
+    path = read(tmp_path, joined, recover=True)
+    assert (path.tips_mm[-1].tolist(), codes(path)) == ([2, 0, 0], {355})
+    with pytest.raises(FormatError, match="line 4: Y word without a number"):
+        read(tmp_path, START + "G1 X1 F9\nX2 Y\nX3\n", recover=True)
+
+
+def test_padding_after_a_crash(tmp_path: Path) -> None:
+    content = (START + "G1 X1 F9\nX2\n").encode() + bytes(512)
+    file = tmp_path / "path.nc"
+    file.write_bytes(content)
+    with pytest.raises(FormatError, match=r"512 NUL bytes, .* --recover") as caught:
+        read_path(file)
+    assert caught.value.byte == len(content) - 512
+    path = read_path(file, recover=True)
+    assert codes(path) == {316, 352}
+    assert path.original is not None
+    assert path.original.rewritten(path, np.arange(3)).content == content
+
+
+def test_a_feed_outlives_the_unit_stated_twice(tmp_path: Path) -> None:
+    path = read(tmp_path, START + "G1 X1 F100\nX2 F200\nG21\nX3\nM2")
+    assert path.feeds_mm_min.tolist() == [0, 100, 200, 200]
+
+
+def test_the_fast_way_and_the_general_way_agree(tmp_path: Path) -> None:
+    body = [
+        "N1 G1 X1. Y-.5 Z+2 A3=.1 B3=0 C3=1 F100",
+        "X2 I.1 K1",
+        "N3 G01 Y3 A3=1 C3=1",
+        "G0 Z9",
+        "G1 X=4 J-1 K2 F=50",
+    ]
+    text = START + "G43.5 H1\n" + "\n".join(body) + "\nM2"
+    slow = START + "G43.5 H1\n" + "\n".join(f"{line} M8" for line in body) + "\nM2"
+    fast, general = read(tmp_path, text), read(tmp_path, slow)
+    assert fast.tips_mm.tolist() == general.tips_mm.tolist()
+    assert fast.axes.tolist() == general.axes.tolist()
+    assert fast.feeds_mm_min.tolist() == general.feeds_mm_min.tolist()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import subprocess
 import sys
@@ -17,15 +16,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from sicp_cam.child_process import ChildCrashError, ChildResult
+from sicp_cam.child_process import ChildCrashError
 from sicp_cam.errors import CadError, FormatError, InputError, UnitError
 from sicp_cam.findings import Level
 from sicp_cam.limits import Limits
-from sicp_formats import step, step_child
-from sicp_formats.step import read_part
-from sicp_formats.step_faces import bodies
-from sicp_formats.step_mesh import signed_volume, tessellate
-from sicp_formats.step_notes import Notes
+from sicp_formats.cad import child as step_child
+from sicp_formats.cad import part as cad_part
+from sicp_formats.cad import step
+from sicp_formats.cad.faces import bodies
+from sicp_formats.cad.mesh import signed_volume, tessellate
+from sicp_formats.cad.notes import Notes, as_findings
+from sicp_formats.cad.step import read_part
 
 MILLIMETRE = "( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) )"
 METRE = "( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT($,.METRE.) )"
@@ -38,23 +39,6 @@ INCH = """( CONVERSION_BASED_UNIT('INCH',#90001) LENGTH_UNIT() NAMED_UNIT(#90003
 def write(shape, path: Path) -> Path:
     cq.exporters.export(cq.Workplane(obj=shape) if not isinstance(shape, cq.Workplane) else shape, str(path))
     return path
-
-
-@pytest.fixture
-def in_process(monkeypatch, tmp_path):
-    """Let the child's work be done here: the kernel is loaded already, and a process start costs a second."""
-
-    def run(module, request, arrays, *, timeout_s, memory_bytes):
-        assert module == step_child.__name__
-        folder = tmp_path / "child"
-        folder.mkdir(exist_ok=True)
-        (folder / "request.json").write_text(json.dumps({"request": request, "memory_bytes": None}))
-        np.savez(folder / "arrays.npz", **arrays)
-        step_child.main(folder)
-        with np.load(folder / "result.npz") as stored:
-            return ChildResult(json.loads((folder / "result.json").read_text()), dict(stored))
-
-    monkeypatch.setattr(step.child_process, "run", run)
 
 
 @pytest.fixture(scope="module")
@@ -408,7 +392,7 @@ def test_any_hole_anywhere_is_exact(radius, axis, angle, shift, tmp_path, in_pro
     ],
 )
 def test_bytes_that_are_no_step_file_never_reach_the_kernel(content, says, tmp_path, monkeypatch):
-    monkeypatch.setattr(step.child_process, "run", lambda *a, **k: pytest.fail("the kernel was started"))
+    monkeypatch.setattr(cad_part.child_process, "run", lambda *a, **k: pytest.fail("the kernel was started"))
     path = tmp_path / "bad.step"
     path.write_bytes(content)
     with pytest.raises(FormatError) as caught:
@@ -437,7 +421,7 @@ def test_numbers_that_no_double_holds_are_found(number):
 
 
 def test_reader_does_not_load_the_kernel():
-    code = "import sys, sicp_formats.step; sys.exit('OCP' in sys.modules or 'cadquery' in sys.modules)"
+    code = "import sys, sicp_formats.cad.step; sys.exit('OCP' in sys.modules or 'cadquery' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -526,7 +510,7 @@ def test_kernel_that_takes_too_long_is_an_error(plate_file):
 
 
 def test_kernel_without_memory_is_an_error(plate_file):
-    with pytest.raises(CadError, match=r"plate\.step: the CAD kernel crashed on it, ended "):
+    with pytest.raises(CadError, match=r"plate\.step: .* more than child_memory_bytes = 209715200; raise limits"):
         read_part(plate_file, limits=Limits(child_memory_bytes=200 * 2**20))
 
 
@@ -534,7 +518,7 @@ def test_kernel_that_crashes_is_an_error(plate_file, monkeypatch):
     def crash(*args, **kwargs):
         raise ChildCrashError("ended by SIGSEGV")
 
-    monkeypatch.setattr(step, "child_process", SimpleNamespace(**vars(step.child_process) | {"run": crash}))
+    monkeypatch.setattr(cad_part, "child_process", SimpleNamespace(**vars(cad_part.child_process) | {"run": crash}))
     with pytest.raises(CadError, match=r"plate\.step: the CAD kernel crashed on it, ended by SIGSEGV"):
         read_part(plate_file)
 
@@ -551,6 +535,6 @@ def test_findings_name_the_file_and_count_what_they_leave_out(tmp_path):
     notes = Notes()
     for number in range(9):
         notes.add(204, Level.INFO, f"entity {number}")
-    findings = step.as_findings(notes.rows(), "part.step")
+    findings = as_findings(notes.rows(), "part.step")
     assert [f.message for f in findings][-1] == f"{9 - (len(findings) - 1)} more of this kind"
     assert {f.where for f in findings} == {"part.step"}

@@ -14,6 +14,7 @@ from post_reread import load_val3
 from sicp_cam.errors import JobError, PathError
 from sicp_cam.model import Event, EventKind
 from sicp_cam.rigid_motion import exponential
+from sicp_postprocessors.apt import Apt
 from sicp_postprocessors.gcode import GCode
 from sicp_postprocessors.path_csv import PathCsv
 from sicp_postprocessors.val3 import Val3
@@ -37,6 +38,9 @@ LINKED = {
 }
 UNCERTAINTY = np.ma.array(np.arange(6) / 70.0, mask=[True, False, False, False, False, True])
 CASES = {
+    "apt": lambda: Apt().write(simple_program()),
+    "apt-inch": lambda: Apt({"units": "inch", "wrap": True}).write(simple_program(T_scan_program=POSE)),
+    "apt-nasty": lambda: Apt().write(nasty_program()),
     "csv": lambda: PathCsv().write(simple_program(columns={"u_mm": UNCERTAINTY})),
     "csv-nasty": lambda: PathCsv().write(nasty_program()),
     "gcode-vector": lambda: GCode().write(simple_program()),
@@ -51,7 +55,9 @@ CASES = {
     "val3-linked": lambda: Val3(LINKED).write(simple_program(T_scan_program=POSE)),
     "val3-nasty": lambda: Val3().write(nasty_program()),
 }
-POSTS = [PathCsv(), GCode(), GCode({"orientation": "rotary"}), GCode({"orientation": "siemens"}), Val3()]
+POSTS = [PathCsv(), GCode(), GCode({"orientation": "rotary"}), GCode({"orientation": "siemens"}), Val3(), Apt()]
+# Lines that hold text of the user: comments, the name of the program, and files named after it.
+TEXT = ("(", ";", "//", "$$", "PPRINT/", "PARTNO/", "<Data file=")
 EACH_POST = pytest.mark.parametrize("post", POSTS, ids=lambda p: f"{p.name}-{getattr(p.options, 'orientation', '')}")
 
 
@@ -90,7 +96,7 @@ def test_nasty_text_changes_no_line_but_its_own(post):
     def statements(files):
         by_kind = sorted(files.items(), key=lambda item: (item[0].rsplit(".", 1)[1], item[0]))
         lines = [line for _, content in by_kind for line in content.decode("utf-8-sig").splitlines()]
-        return [x for x in lines if not x.strip().startswith(("(", ";", "//", "<Data file="))]
+        return [x for x in lines if not x.strip().startswith(TEXT)]
 
     assert statements(nasty_files) == statements(plain_files)
 
@@ -118,7 +124,7 @@ def test_nasty_text_leaves_val3_well_formed():
 @pytest.mark.parametrize("post", POSTS[1:], ids=lambda p: f"{p.name}-{getattr(p.options, 'orientation', '')}")
 def test_every_program_says_once_what_made_it_and_that_it_is_no_safety_function(post):
     text = b"".join(post.write(simple_program()).values()).decode("utf-8-sig")
-    assert re.search(r"^\s*(\(|;|//) ?porthole\)?\r?$", text, re.MULTILINE)
+    assert re.search(r"^\s*(\(|;|//|\$\$) ?porthole\)?\r?$", text, re.MULTILINE)
     assert text.count("not a safety function") == text.count("corrected by sicp_cam") == 1
 
 

@@ -1,6 +1,7 @@
 """Any path written as APT, G-code or CSV is read back; any damage gives a path or a typed error, nothing else."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,8 +12,8 @@ from hypothesis import strategies as st
 
 from sicp_cam.errors import SicpError
 from sicp_cam.model import ToolPath
-from sicp_formats import apt, gcode, path_csv
-from sicp_formats.arcs import arc_between, centre_for_radius, cross, dot, unit
+from sicp_formats import apt, gcode, path_csv, path_text
+from sicp_formats.paths.arcs import arc_between, centre_for_radius, cross, dot, unit
 
 Rows = list[tuple[tuple[float, float, float], tuple[float, float, float], int, bool]]
 
@@ -180,3 +181,43 @@ def test_arcs_stay_within_chord_and_step(
     if abs(sweep - np.pi) > 1e-2:
         assert found is not None
         assert np.linalg.norm(np.array(found) - c) < 1e-3 * max(radius, 1.0)
+
+
+TEXT_SEEDS = [(name, text) for name, _, text in SEEDS]
+
+
+@pytest.mark.parametrize(("name", "text"), TEXT_SEEDS, ids=["apt", "gcode", "csv"])
+@settings(deadline=None, max_examples=25)
+@given(data=st.data())
+def test_damaged_text_files_give_a_path_or_a_typed_error(name: str, text: str, data: st.DataObject) -> None:
+    damaged = bytearray(text.encode())
+    for _ in range(data.draw(st.integers(0, 3))):
+        damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.integers(0, 255))
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "path.txt"
+        file.write_bytes(bytes(damaged))
+        try:
+            path = path_text.read_path(file)
+        except SicpError as error:
+            assert "path.txt" in str(error)
+            assert str(error).isprintable()
+        else:
+            assert np.allclose(np.linalg.norm(path.axes, axis=1), 1)
+
+
+@settings(deadline=None, max_examples=25)
+@given(path=rows)
+def test_tables_are_written_again_as_they_stand(path: Rows) -> None:
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "path.csv"
+        file.write_text(as_csv(path))
+        found = path_csv.read_path(file)
+        assert found.original is not None
+        same = found.original.rewritten(found, np.arange(len(found)))
+        assert same.content == file.read_bytes()
+        turned = replace(found, tips_mm=found.tips_mm[:, ::-1] + 1.0, axes=found.axes[:, ::-1])
+        file.write_bytes(found.original.rewritten(turned, np.arange(len(found))).content)
+        again = path_csv.read_path(file)
+    assert np.abs(again.tips_mm - turned.tips_mm).max() <= 6e-5
+    assert np.abs(again.axes - turned.axes).max() <= 2e-7
+    assert again.feeds_mm_min.tolist() == found.feeds_mm_min.tolist()

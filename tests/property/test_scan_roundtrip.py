@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from sicp_cam.errors import SicpError
 from sicp_cam.model import Scan
-from sicp_formats import ascii_scan, ply, stl
+from sicp_formats import ascii as ascii_scan
+from sicp_formats import pcd, ply, stl
 
 ENCODINGS = ("ascii", "binary_little_endian", "binary_big_endian")
 coordinates = st.floats(-1e6, 1e6, allow_nan=False)
@@ -40,7 +41,9 @@ def scans(draw: st.DrawFn) -> Scan:
                 *(draw(st.permutations(range(len(points))))[:3] for _ in range(draw(st.integers(0, 5)))),
             ]
         )
-    return Scan(points, normals, faces)
+    numbers = st.lists(st.floats(), min_size=len(points), max_size=len(points)).map(np.array)
+    columns = draw(st.dictionaries(st.sampled_from(["red", "scalar_Q", "größe"]), numbers, max_size=2))
+    return Scan(points, normals, faces, columns=columns)
 
 
 @modest
@@ -49,9 +52,12 @@ def test_ply_written_and_read_is_the_same(
     tmp_path: Path, scan: Scan, encoding: Literal["ascii", "binary_little_endian", "binary_big_endian"]
 ) -> None:
     path = tmp_path / "scan.ply"
-    path.write_bytes(ply.encode(scan, encoding=encoding))
+    path.write_bytes(ply.write_scan(scan, encoding=encoding))
     again = ply.read_scan(path)
     assert np.array_equal(again.points_mm, scan.points_mm)
+    assert list(again.columns) == list(scan.columns)
+    for name, values in scan.columns.items():
+        assert np.array_equal(again.columns[name], values, equal_nan=True)
     for ours, theirs in ((again.normals, scan.normals), (again.faces, scan.faces)):
         assert (ours is None) == (theirs is None)
         assert ours is None or theirs is None or np.array_equal(ours, theirs)
@@ -83,11 +89,13 @@ MIXED_PLY = (
     + struct.pack("<B3IB4I", 3, 0, 1, 2, 4, 0, 1, 2, 3)
 )
 SEEDS = {
-    "ascii.ply": ply.encode(SCAN, encoding="ascii"),
-    "little.ply": ply.encode(SCAN),
-    "big.ply": ply.encode(SCAN, encoding="binary_big_endian"),
+    "ascii.ply": ply.write_scan(SCAN, encoding="ascii"),
+    "little.ply": ply.write_scan(SCAN),
+    "big.ply": ply.write_scan(SCAN, encoding="binary_big_endian"),
     "mixed.ply": MIXED_PLY,
-    "mixed_text.ply": ply.encode(SCAN, encoding="ascii").replace(b"3 0 2 3", b"4 0 1 2 3"),
+    "mixed_text.ply": ply.write_scan(SCAN, encoding="ascii").replace(b"3 0 2 3", b"4 0 1 2 3"),
+    "text.pcd": pcd.write_scan(SCAN, data="ascii"),
+    "binary.pcd": pcd.write_scan(SCAN),
     "binary.stl": b" " * 80 + struct.pack("<I", 2) + FACETS,
     "text.stl": b"solid a\n"
     + b"".join(
@@ -108,7 +116,12 @@ SEEDS = {
 def read(path: Path) -> None:
     if path.suffix == ".stl":
         stl.read_part(path)
-    reader = {".ply": ply.read_scan, ".stl": stl.read_scan, ".asc": ascii_scan.read_scan}[path.suffix]
+    reader = {
+        ".ply": ply.read_scan,
+        ".pcd": pcd.read_scan,
+        ".stl": stl.read_scan,
+        ".asc": ascii_scan.read_scan,
+    }[path.suffix]
     scan = reader(path)
     assert np.isfinite(scan.points_mm).all() and len(scan.points_mm) >= 3
 
@@ -146,7 +159,23 @@ def test_changed_bytes_are_read_or_refused(tmp_path: Path, name: str, data: st.D
 
 
 @modest
-@given(content=st.binary(max_size=300), suffix=st.sampled_from([".ply", ".stl", ".asc"]))
+@given(name=st.sampled_from(sorted(name for name in SEEDS if name.endswith((".ply", ".pcd")))), data=st.data())
+def test_damaged_files_are_repaired_or_refused(tmp_path: Path, name: str, data: st.DataObject) -> None:
+    content = bytearray(SEEDS[name])
+    for _ in range(data.draw(st.integers(0, 3))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = tmp_path / name
+    path.write_bytes(bytes(content[: data.draw(st.integers(0, len(content)))]))
+    reader = ply.read_scan if path.suffix == ".ply" else pcd.read_scan
+    try:
+        scan = reader(path, recover=True)
+        assert np.isfinite(scan.points_mm).all() and len(scan.points_mm) >= 3
+    except SicpError as error:
+        assert str(path) in str(error)
+
+
+@modest
+@given(content=st.binary(max_size=300), suffix=st.sampled_from([".ply", ".pcd", ".stl", ".asc"]))
 def test_noise_is_read_or_refused(tmp_path: Path, content: bytes, suffix: str) -> None:
     path = tmp_path / f"noise{suffix}"
     path.write_bytes(content)

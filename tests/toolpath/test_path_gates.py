@@ -43,7 +43,7 @@ def carried(made, tips, after, axes=None, status=None):
     rigid = made.path(tips)
     words = (Status.COVERED,) * len(tips) if status is None else tuple(status)
     moved = made.path(after, UP if axes is None else axes)
-    return CorrectedPath(rigid, rigid, moved, words, np.zeros(len(tips), dtype=bool))
+    return CorrectedPath(rigid, rigid, moved, words, np.arange(len(tips)), np.zeros(len(tips), dtype=bool))
 
 
 def tilted(degrees):
@@ -173,7 +173,7 @@ def test_a_turn_that_the_nominal_axis_makes_too_is_none(made):
     turned = tilted(np.linspace(0.0, 90.0, 31))
     tips = np.stack([np.arange(31.0), np.zeros(31), np.zeros(31)], 1)
     path = made.path(tips, turned)
-    done = CorrectedPath(path, path, path, (Status.COVERED,) * 31, np.zeros(31, bool))
+    done = CorrectedPath(path, path, path, (Status.COVERED,) * 31, np.arange(31), np.zeros(31, bool))
     assert gate(judged(done), "axis_slope").value == 0.0
 
 

@@ -1,0 +1,1 @@
+"""What all readers of scans and meshes share: checks, merged vertices, polygons, units."""

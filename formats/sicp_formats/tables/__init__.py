@@ -1,0 +1,1 @@
+"""Rows of numbers in text, quickly and strictly."""

@@ -1,0 +1,145 @@
+"""APT cutter location data in the common words of ISO 4343, which posts and simulators of all makers read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from sicp_cam.errors import JobError
+from sicp_cam.findings import Finding, Level
+from sicp_cam.model import Event, EventKind, Program
+from sicp_cam.units import mm_per_unit
+from sicp_postprocessors.base import LinePostprocessor, Move, failures
+from sicp_postprocessors.checks import frame_findings, in_scan_frame, stretch_findings
+from sicp_postprocessors.moves import events_in_order
+from sicp_postprocessors.numbers import fixed, trimmed
+from sicp_postprocessors.options import outside
+from sicp_postprocessors.text import ascii_line, pose_words
+
+__all__ = ["Apt", "AptOptions"]
+
+_WORDS = {"mm": ("MM", "MMPM"), "inch": ("INCHES", "IPM")}
+_DECIMALS = {"mm": 4, "inch": 6}
+_LONGEST_NAME = 65  # with PARTNO/ that makes the 72 columns of a card
+
+
+@dataclass(frozen=True, slots=True)
+class AptOptions:
+    """Options of the post `apt`."""
+
+    units: Literal["mm", "inch"] = "mm"
+    """Unit of positions, and of feeds per minute."""
+    decimals: int | None = None
+    """Decimals of positions and feeds: by default 4 in mm and 6 in inch."""
+    vector_decimals: int = 7
+    """Decimals of tool axes."""
+    wrap: bool = False
+    """Put the tool axis on a line of its own behind a $, for readers that take no more than 72 characters."""
+
+    def __post_init__(self) -> None:
+        problems = outside("decimals", self.position_decimals, 3, 10) + outside(
+            "vector_decimals", self.vector_decimals, 5, 12
+        )
+        if problems:
+            raise JobError(*problems)
+
+    @property
+    def position_decimals(self) -> int:
+        """Decimals of positions, by the unit where none are stated."""
+        return _DECIMALS[self.units] if self.decimals is None else self.decimals
+
+
+class Apt(LinePostprocessor):
+    """APT with MULTAX/ON: every GOTO states tip and tool axis (tip to holder), RAPID stands before every rapid one."""
+
+    name = "apt"
+    summary = "APT cutter location data (ISO 4343 words): GOTO with tool axis, for another post or a simulator"
+    Options = AptOptions
+    options: AptOptions
+    suffix = ".apt"
+    comment_drop = "$'"
+    missing_feed = Level.WARN
+    """CL data may leave the feeds to the post that follows, but a feed once stated would rule the moves without one."""
+
+    def preflight(self, program: Program) -> list[Finding]:
+        """Return the findings of every post, and of the frame of the coordinates."""
+        findings = super().preflight(program)
+        feeds = program.path.feeds_mm_min
+        missing = ~program.path.rapid & (feeds <= 0.0)
+        if missing.any() and (feeds > 0.0).any():
+            what = "cutting move with feed 0; an earlier one would rule it: state one with --set path.feed_mm_min=..."
+            findings += stretch_findings(program.path, missing, 603, Level.FAIL, what)
+        if failures(findings):
+            return findings
+        remedy = "place the part at the pose in the head of the program, or run with --frame scan"
+        return [*findings, *frame_findings(program, Level.WARN, remedy)]
+
+    def begin(self, program: Program) -> Iterator[str]:
+        """Name the program."""
+        yield f"PARTNO/{ascii_line(program.name, drop=self.comment_drop)[:_LONGEST_NAME].rstrip()}"
+
+    def comment(self, text: str) -> str:
+        """Return a remark, kept from reading like a frame, which CATIA and Creo write into remarks."""
+        return f"$$ - {text}" if text.startswith(("*", "->")) else f"$$ {text}"
+
+    def remarks(self, program: Program) -> Iterator[str]:
+        """Return in which frame the coordinates are."""
+        if in_scan_frame(program):
+            yield "coordinates in the scan frame"
+        else:
+            yield "coordinates in the part frame"
+            yield f"its pose in the scan frame: {pose_words(program.T_scan_program)}"
+
+    def setup(self, program: Program) -> Iterator[str]:
+        """State the unit, and that every point has an axis."""
+        yield f"UNITS/{_WORDS[self.options.units][0]}"
+        yield "MULTAX/ON"
+
+    def move(self, move: Move, previous: Move | None) -> Iterator[str]:
+        """Return one GOTO, with RAPID before it or the feed where it changes."""
+        if move.rapid:
+            yield "RAPID"
+        elif move.feed_mm_min > 0.0 and (
+            previous is None or previous.rapid or previous.feed_mm_min != move.feed_mm_min
+        ):
+            yield f"FEDRAT/{self._length(move.feed_mm_min)},{_WORDS[self.options.units][1]}"
+        tip = ",".join(self._length(value) for value in move.tip_mm)
+        axis = ",".join(fixed(value, self.options.vector_decimals) for value in move.axis)
+        if self.options.wrap:
+            yield f"GOTO/{tip},$"
+            yield f"     {axis}"
+        else:
+            yield f"GOTO/{tip},{axis}"
+
+    def event(self, event: Event) -> Iterator[str]:
+        """Return the statement of one event."""
+        match event.kind:
+            case EventKind.SPINDLE if event.value == 0:
+                yield "SPINDL/OFF"
+            case EventKind.SPINDLE:
+                yield f"SPINDL/{trimmed(abs(event.value), 3)},RPM,{'CLW' if event.value > 0 else 'CCLW'}"
+            case EventKind.TOOL:
+                yield f"LOADTL/{int(event.value)}"
+                yield from self.comments(event.text)
+            case EventKind.COOLANT:
+                yield "COOLNT/ON" if event.value > 0 else "COOLNT/OFF"
+            case EventKind.DWELL:
+                yield f"DELAY/{fixed(event.value, 3)}"
+            case EventKind.STOP:
+                yield "OPSTOP" if event.text.strip().upper() == "OPSTOP" else "STOP"
+            case EventKind.COMMENT:
+                yield from (f"PPRINT/{line.removeprefix('$$ ')}" for line in self.comments(event.text))
+
+    def end(self, program: Program) -> Iterator[str]:
+        """Switch off what still runs, and end."""
+        running = dict.fromkeys((EventKind.SPINDLE, EventKind.COOLANT), 0.0)
+        running |= {event.kind: event.value for event in events_in_order(program.path) if event.kind in running}
+        if running[EventKind.SPINDLE]:
+            yield "SPINDL/OFF"
+        if running[EventKind.COOLANT]:
+            yield "COOLNT/OFF"
+        yield "FINI"
+
+    def _length(self, value_mm: float) -> str:
+        return fixed(value_mm / mm_per_unit(self.options.units), self.options.position_decimals)
