@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from sicp_cam import plugins
-from sicp_cam.errors import InputError, JobError, printable
+from sicp_cam.errors import FormatError, InputError, JobError, printable
 from sicp_cam.job.input_files import absent, is_pose
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 
@@ -67,13 +67,20 @@ def role_of(
 
 
 def _by_content(path: Path, otherwise: str, units: str | None, limits: Limits, options: Mapping[str, object]) -> str:
-    """Tell a path from a table of measured points: by the reader that can read it, or by the axes that it states."""
+    """Tell a path from a table of measured points: by the reader that can read it, or by the axes that it states.
+
+    Where neither can, the one that came further in the file is to say why.
+    """
     try:
         moves = plugins.read_path(path, units=units, limits=limits, options=options)
     except (InputError, JobError) as no_path:
         try:
-            plugins.check_reader(otherwise, path, options)
-        except JobError:
-            raise no_path from None
+            plugins.read_scan(path, units=units, limits=limits, options=options)
+        except (InputError, JobError) as no_scan:
+            return "path" if _line(no_path) > _line(no_scan) else otherwise
         return otherwise
     return otherwise if any(finding.code == _AXIS_ASSUMED for finding in moves.findings) else "path"
+
+
+def _line(error: Exception) -> int:
+    return (error.line or 0) if isinstance(error, FormatError) else 0

@@ -35,6 +35,11 @@ def test_a_program_in_a_text_file_is_a_path(tmp_path):
     assert role_of(made(tmp_path, "a.txt", "UNITS/MM\nGOTO/0,0,0\nGOTO/1,0,0,0,0,1\nFINI\n")) == "path"
 
 
+def test_what_neither_can_read_is_what_it_was_for_longer(tmp_path):
+    assert role_of(made(tmp_path, "a.txt", "UNITS/MM\nGOTO/0,0,0\nGOTO/1,0\nFINI\n")) == "path"
+    assert role_of(made(tmp_path, "b.txt", POINTS + "0 0\n")) == "scan"
+
+
 def test_what_cannot_be_is_refused(tmp_path):
     with pytest.raises(JobError, match="is read as a part, and that cannot become a path"):
         role_of(made(tmp_path, "a.step", "?"), among=("path",))

@@ -18,7 +18,7 @@ def convert(
     /,
     *,
     role: Literal["scan", "part", "path"] | None = None,
-    units: str | None = None,
+    units: Annotated[str | None, Parameter(alias=["--scan-units", "--cad-units", "--path-units"])] = None,
     out_units: str = "mm",
     post: str | None = None,
     recover: Annotated[bool, Parameter(negative="", show_default=False)] = False,

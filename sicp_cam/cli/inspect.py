@@ -19,7 +19,7 @@ def inspect(
     /,
     *,
     role: Role | None = None,
-    units: str | None = None,
+    units: Annotated[str | None, Parameter(alias=["--scan-units", "--cad-units", "--path-units"])] = None,
     picture: Path | None = None,
     recover: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     force: Annotated[bool, Parameter(negative="", show_default=False)] = False,

@@ -132,6 +132,8 @@ def without(planes: LocalPlanes, points_mm: FloatArray, tree: cKDTree, dropped: 
     dropped
         (n,) True for the others.
     """
+    if len(points_mm) < planes.neighbours.shape[1]:
+        return local_planes(points_mm, tree)  # so few that each has fewer neighbours now
     number = np.cumsum(~dropped) - 1
     touched = np.any(dropped[planes.neighbours[~dropped]], axis=1)
     distances, near = tree.query(points_mm[touched], k=min(planes.neighbours.shape[1], len(points_mm)))

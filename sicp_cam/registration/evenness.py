@@ -14,6 +14,8 @@ from sicp_cam.model import BoolArray, FloatArray, IntArray, Scan
 __all__ = ["evened", "evenness"]
 
 NEIGHBOURS = 8
+LEAST_POINTS = 50
+"""Fewer show no rows, and could be thinned to nothing."""
 SAMPLE = 500
 EVEN = 0.35
 """Least evenness of a cloud that is left as it is; jittered grids and points at random have 0.6 to 0.8."""
@@ -31,7 +33,7 @@ def evenness(points_mm: FloatArray) -> float:
     _, near = cKDTree(points_mm).query(some, k=min(NEIGHBOURS + 1, len(points_mm)))
     away = points_mm[near] - points_mm[near].mean(axis=1, keepdims=True)
     extents = np.linalg.eigvalsh(np.einsum("nki,nkj->nij", away, away))
-    return float(np.sqrt(np.median(extents[:, 1] / np.maximum(extents[:, 2], 1e-300))))
+    return float(np.sqrt(np.median(np.maximum(extents[:, 1], 0.0) / np.maximum(extents[:, 2], 1e-300))))
 
 
 def evened(scan: Scan) -> Scan:
@@ -40,14 +42,17 @@ def evened(scan: Scan) -> Scan:
     Points closer to a kept one than a radius go; the radius grows until the cloud is even. A mesh, and a cloud that is
     even already, stay as they are.
     """
-    if scan.faces is not None or evenness(scan.points_mm) >= EVEN:
+    if scan.faces is not None or len(scan.points_mm) < LEAST_POINTS or evenness(scan.points_mm) >= EVEN:
         return scan
     tree = cKDTree(scan.points_mm)
     distance, _ = tree.query(scan.points_mm[:: max(1, len(scan.points_mm) // SAMPLE)], k=2)
     radius_mm = 2.0 * float(np.median(distance[:, 1]))
     kept = np.ones(len(scan.points_mm), dtype=bool)
     for _ in range(MOST_ROUNDS):
-        kept = _apart(len(scan.points_mm), tree.query_pairs(radius_mm, output_type="ndarray"))
+        fewer = _apart(len(scan.points_mm), tree.query_pairs(radius_mm, output_type="ndarray"))
+        if fewer.sum() < LEAST_POINTS:
+            break  # points on a line never get even
+        kept = fewer
         if evenness(scan.points_mm[kept]) >= EVENED:
             break
         radius_mm *= WIDER

@@ -92,5 +92,5 @@ def _listed(counts: Counter[str]) -> str:
 def _nothing(others: Counter[str], hidden: Counter[tuple[str, str]]) -> str:
     found = [f"{count} {kind}" for kind, count in sorted(others.items())]
     found += [f"{count} on layer {layer} ({why})" for (layer, why), count in sorted(hidden.items())]
-    told = ", ".join(found[:_MOST_LAYERS]) or "nothing at all"
-    return f"holds no visible curve in model space, but {told}; export the contour as lines, arcs or polylines"
+    told = f"no visible curve in model space, but {', '.join(found[:_MOST_LAYERS])}" if found else "nothing at all"
+    return f"holds {told}; export the contour into model space as lines, arcs or polylines"
