@@ -20,7 +20,7 @@ from sicp_cam import output, plugins
 from sicp_cam.errors import InputError, JobError, OutputError, SicpError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
-from sicp_cam.model import Part, Program, Scan, Status, ToolPath
+from sicp_cam.model import FloatArray, IntArray, Part, Program, Scan, Status, ToolPath
 from sicp_cam.result_document import SCHEMA, findings_list, input_entry, output_entry, status, versions
 from sicp_cam.roles import role_of
 from sicp_cam.units import mm_per_unit
@@ -140,8 +140,19 @@ def _same_words(job: Conversion) -> bool:
 # --- scans and parts ---
 
 
-def _points(thing: Scan | Part) -> Any:
+def _points(thing: Scan | Part) -> FloatArray:
     return thing.points_mm if isinstance(thing, Scan) else thing.mesh.vertices_mm
+
+
+def _faces(thing: Scan | Part) -> IntArray | None:
+    faces = thing.faces if isinstance(thing, Scan) else thing.mesh.faces
+    return faces if faces is not None and len(faces) else None
+
+
+def _corners(thing: Scan | Part) -> FloatArray:
+    """Return (m, 3, 3) corners of the triangles: equal vertices may have been merged on reading back."""
+    faces = _faces(thing)
+    return np.zeros((0, 3, 3)) if faces is None else _points(thing)[faces]
 
 
 def _encoded(
@@ -151,20 +162,22 @@ def _encoded(
     if job.target.suffix.lower() == ".gz":
         content = gzip.compress(content, mtime=0)
     back = _read_back(job, role, content)
-    points, again = _points(thing), _points(back)
-    if len(points) != len(again):
+    meshed = _faces(back) is not None
+    noun = "triangles" if meshed else "points"
+    before, after = (_corners(thing), _corners(back)) if meshed else (_points(thing), _points(back))
+    if before.shape != after.shape:
         raise OutputError(
-            f"{printable(str(job.target))}: {len(points)} points were to be written, {len(again)} read back; nothing"
+            f"{printable(str(job.target))}: {len(before)} {noun} were to be written, {len(after)} read back; nothing"
             " was written: choose another format"
         )
-    far = float(np.abs(points - again).max(initial=0.0))
+    far = float(np.abs(before - after).max(initial=0.0))
     findings = []
     if far > 0.0:
         findings.append(Finding(111, Level.INFO, f"coordinates were rounded by up to {far:.3g} mm", str(job.target)))
     if lost := _lost(thing, back):
         message = f"the format has no place for {', '.join(lost)}; not written"
         findings.append(Finding(110, Level.WARN, message, str(job.target)))
-    return {job.target.name: content}, tuple(findings), {"count": len(again), "largest_difference_mm": far}
+    return {job.target.name: content}, tuple(findings), {"count": len(_points(back)), "largest_difference_mm": far}
 
 
 def _read_back(job: Conversion, role: str, content: bytes) -> Scan | Part:

@@ -59,6 +59,19 @@ def test_a_cloud_does_not_become_a_mesh(scan_file):
     assert not scan_file.with_name("b.stl").exists()
 
 
+@pytest.mark.parametrize("name", ["b.ply", "b.stl", "b.obj", "b.off"])
+def test_a_mesh_with_seams_becomes_another_and_its_seams_are_closed(tmp_path, name):
+    corners = [[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 0], [0, 0, 0], [9, 9, 0]]
+    scan = Scan(corners, faces=[[0, 1, 2], [4, 5, 3]])
+    source = tmp_path / "a.ply"
+    source.write_bytes(plugins.encoded("scan", source, scan))
+    target, document = converted(source, name, role="part")
+    assert document["read_back"] == {"count": 4, "largest_difference_mm": 0.0}
+    assert len(plugins.read_part(target).mesh.faces) == 2
+    _, document = converted(target, "c.xyz", role="scan")
+    assert "triangles" in " ".join(finding["message"] for finding in document["findings"])
+
+
 def test_the_unit_of_what_is_written_is_that_asked_for(scan_file):
     target, document = converted(scan_file, "b.ply", out_units="inch", role="scan")
     assert document["outputs"][0]["units"] == "inch"
