@@ -38,7 +38,7 @@ from sicp_cam import plugins
 import sicp_formats.ascii
 
 def most_kib():  # ru_maxrss would be that of the process that started this one
-    return int(re.search("VmHWM: *([0-9]+) kB", Path("/proc/self/status").read_text()).group(1))
+    return int(re.search("VmHWM:\\s*([0-9]+) kB", Path("/proc/self/status").read_text()).group(1))
 
 before = most_kib()
 scan = plugins.read_scan(Path(sys.argv[1]))

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from sicp_cam import output, plugins
+from sicp_cam.correction import unit_taken
 from sicp_cam.errors import InputError, JobError, OutputError, SicpError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
-from sicp_cam.model import FloatArray, IntArray, Part, Program, Scan, Status, ToolPath
+from sicp_cam.model import FloatArray, IntArray, Part, Program, Scan, Source, Status, ToolPath
 from sicp_cam.result_document import SCHEMA, findings_list, input_entry, output_entry, status, versions
 from sicp_cam.roles import role_of
 from sicp_cam.units import mm_per_unit
@@ -28,6 +29,9 @@ from sicp_cam.units import mm_per_unit
 __all__ = ["Conversion", "convert"]
 
 Options = Mapping[str, object]
+
+_FAR_MM, _TURNED = 0.002, 1e-4
+"""What rounding to the decimals of a program may move a tip by, and a component of an axis."""
 
 
 def _none() -> Options:
@@ -45,7 +49,7 @@ class Conversion:
     role
         What the file is; None where its content tells.
     units, out_units
-        Unit of the numbers read, where the file states none; and of those written.
+        Unit of the numbers read, where the file states none; and of those written, mm if None.
     post
         Postprocessor of a path; None for the one that writes the suffix of the target: the words of the program that
         was read, where it has the same suffix.
@@ -61,7 +65,7 @@ class Conversion:
     target: Path
     role: str | None = None
     units: str | None = None
-    out_units: str = "mm"
+    out_units: str | None = None
     post: str | None = None
     recover: bool = False
     force: bool = False
@@ -84,21 +88,24 @@ def convert(job: Conversion) -> dict[str, Any]:
     OutputError
         If the target exists, cannot be written, or does not read back as what was read.
     """
-    mm_per_unit(job.out_units)
+    out_unit = job.out_units or "mm"
+    mm_per_unit(out_unit)
     role = job.role or _role(job)
     output.check_free(job.target.parent, [job.target.name], job.force, [job.source])
     thing = _read(job, role)
-    files, findings, read_back = _program(job, thing) if isinstance(thing, ToolPath) else _encoded(job, role, thing)
+    taken = _taken(job, role, thing.source)
+    done = _program(job, thing, out_unit) if isinstance(thing, ToolPath) else _encoded(job, role, thing, out_unit)
+    files, findings, read_back = done
     output.write(job.target.parent, files, force=job.force, inputs=[job.source])
     count = len(thing) if isinstance(thing, ToolPath) else len(_points(thing))
-    noticed = (*thing.findings, *findings)
+    noticed = (*taken, *thing.findings, *findings)
     return {
         "schema": SCHEMA,
         "status": status(noticed, ()),
         "findings": findings_list(noticed),
         "inputs": [input_entry(role, thing.source, count)],
         "outputs": [
-            {**output_entry(_KINDS[role], name, content), "units": job.out_units} for name, content in files.items()
+            {**output_entry(_KINDS[role], name, content), "units": out_unit} for name, content in files.items()
         ],
         "read_back": read_back,
         "versions": dict(versions()),
@@ -117,6 +124,24 @@ def _read(job: Conversion, role: str) -> Scan | Part | ToolPath:
     return readers[role](job.source, units=job.units, limits=job.limits, options=job.in_options, recover=job.recover)
 
 
+def _taken(job: Conversion, role: str, source: Source | None) -> tuple[Finding, ...]:
+    """Warn of a unit that no one stated; it cannot be changed into another one.
+
+    Raises
+    ------
+    JobError
+        If another unit is asked for.
+    """
+    if source is None or source.unit_stated or role == "path":
+        return ()
+    if job.out_units is not None and job.out_units != "mm":
+        raise JobError(
+            f"out_units: {printable(str(job.source))} states no unit, so there is none to be changed; state it with"
+            " --units"
+        )
+    return (unit_taken(source, "--units"),)
+
+
 def _role(job: Conversion) -> str:
     """Return the one role in which the source can be read and the target written."""
     writable = [*plugins.writable_roles(job.target)]
@@ -125,9 +150,10 @@ def _role(job: Conversion) -> str:
     elif plugins.posts_writing(job.target) or _same_words(job):
         writable.append("path")
     if not writable:
+        known = ", ".join(plugins.writable_suffixes())
         raise JobError(
-            f"{printable(str(job.target))}: nothing writes the suffix '{printable(job.target.suffix, 40)}';"
-            " see sicp-cam plugins, or name a postprocessor with --post"
+            f"{printable(str(job.target))}: nothing writes the suffix '{printable(job.target.suffix, 40)}'; writable:"
+            f" {known}; or name the postprocessor of a path with --post"
         )
     return role_of(job.source, among=writable, units=job.units, limits=job.limits, options=job.in_options)
 
@@ -156,12 +182,12 @@ def _corners(thing: Scan | Part) -> FloatArray:
 
 
 def _encoded(
-    job: Conversion, role: str, thing: Scan | Part
+    job: Conversion, role: str, thing: Scan | Part, out_unit: str
 ) -> tuple[dict[str, bytes], tuple[Finding, ...], dict[str, Any]]:
-    content = plugins.encoded(role, job.target, thing, unit=job.out_units, options=job.out_options)
+    content = plugins.encoded(role, job.target, thing, unit=out_unit, options=job.out_options)
     if job.target.suffix.lower() == ".gz":
         content = gzip.compress(content, mtime=0)
-    back = _read_back(job, role, content)
+    back = _read_back(job, role, content, out_unit)
     meshed = _faces(back) is not None
     noun = "triangles" if meshed else "points"
     before, after = (_corners(thing), _corners(back)) if meshed else (_points(thing), _points(back))
@@ -180,13 +206,13 @@ def _encoded(
     return {job.target.name: content}, tuple(findings), {"count": len(_points(back)), "largest_difference_mm": far}
 
 
-def _read_back(job: Conversion, role: str, content: bytes) -> Scan | Part:
+def _read_back(job: Conversion, role: str, content: bytes, out_unit: str) -> Scan | Part:
     reader = plugins.read_scan if role == "scan" else plugins.read_part
     with tempfile.TemporaryDirectory(prefix="sicp-cam-") as folder:
         copy = Path(folder) / job.target.name
         copy.write_bytes(content)
         try:
-            return reader(copy, units=job.out_units, limits=job.limits, options=_reading_options(job))
+            return reader(copy, units=out_unit, limits=job.limits, options=_reading_options(job))
         except SicpError as error:
             told = str(error).replace(str(copy), printable(str(job.target)))
             raise OutputError(f"{told}; nothing was written: change the options of the writer") from error
@@ -208,11 +234,13 @@ def _lost(thing: Scan | Part, back: Scan | Part) -> list[str]:
 # --- paths ---
 
 
-def _program(job: Conversion, path: ToolPath) -> tuple[dict[str, bytes], tuple[Finding, ...], dict[str, Any] | None]:
+def _program(
+    job: Conversion, path: ToolPath, out_unit: str
+) -> tuple[dict[str, bytes], tuple[Finding, ...], dict[str, Any] | None]:
     name = _post(job, path)
     options = dict(job.out_options)
-    if job.out_units != "mm" and name != "same":
-        options.setdefault("units", job.out_units)
+    if out_unit != "mm" and name != "same":
+        options.setdefault("units", out_unit)
     post = plugins.postprocessor(name, options)
     program = Program(
         job.target.name.split(".")[0],
@@ -220,20 +248,25 @@ def _program(job: Conversion, path: ToolPath) -> tuple[dict[str, bytes], tuple[F
         (Status.APPROACH,) * len(path),
         notes=tuple(_notes(path)),
         source_moves=np.arange(len(path)),
+        corrected=False,
     )
     files: dict[str, bytes] = post.write(program)
     findings = tuple(post.preflight(program))
-    if len(files) == 1 and job.target.suffix:
-        (content,) = files.values()
-        files = {job.target.name: content}
-        return files, findings, _path_read_back(job, path, content)
-    return files, findings, None
+    if len(files) != 1 or not job.target.suffix:
+        return files, (*findings, _not_read_back(job, "it is a folder of files")), None
+    (content,) = files.values()
+    read_back, found = _path_read_back(job, path, content)
+    return {job.target.name: content}, findings + found, read_back
+
+
+def _not_read_back(job: Conversion, why: str) -> Finding:
+    return Finding(652, Level.INFO, f"what was written was not read back: {why}", str(job.target))
 
 
 def _post(job: Conversion, path: ToolPath) -> str:
     if job.post is not None:
         return job.post
-    if path.original is not None and _same_words(job) and job.out_units == _unit_of(path):
+    if path.original is not None and _same_words(job) and (job.out_units is None or job.out_units == _unit_of(path)):
         return "same"
     posts = [name for name in plugins.posts_writing(job.target) if name != "same"]
     if not posts:
@@ -251,15 +284,35 @@ def _notes(path: ToolPath) -> list[str]:
     return [made] if source is None else [made, f"path {Path(source.path).name} sha256 {source.sha256[:16]}"]
 
 
-def _path_read_back(job: Conversion, path: ToolPath, content: bytes) -> dict[str, Any] | None:
-    """Compare what was written with what was read; None where the program needs a machine to be read."""
+def _path_read_back(
+    job: Conversion, path: ToolPath, content: bytes
+) -> tuple[dict[str, Any] | None, tuple[Finding, ...]]:
+    """Compare what was written with what was read, where the reader needs nothing more to be told.
+
+    Raises
+    ------
+    OutputError
+        If a move is missing or lies elsewhere.
+    """
     with tempfile.TemporaryDirectory(prefix="sicp-cam-") as folder:
         copy = Path(folder) / job.target.name
         copy.write_bytes(content)
+        options = job.in_options if _same_words(job) else {}
         try:
-            again = plugins.read_path(copy, limits=job.limits)
-        except (InputError, JobError):
-            return None
-    if len(again) != len(path):
-        return {"count": len(again), "largest_difference_mm": None}
-    return {"count": len(again), "largest_difference_mm": float(np.abs(again.tips_mm - path.tips_mm).max())}
+            again = plugins.read_path(copy, limits=job.limits, options=options)
+        except (InputError, JobError) as error:
+            why = str(error).replace(str(copy), printable(str(job.target)))
+            return None, (_not_read_back(job, why),)
+    if len(again) != len(path) or (again.rapid != path.rapid).any():
+        raise OutputError(
+            f"{printable(str(job.target))}: {len(path)} moves were to be written, and {len(again)} or others were read"
+            " back; nothing was written: choose another format"
+        )
+    far = float(np.abs(again.tips_mm - path.tips_mm).max())
+    turned = float(np.abs(again.axes - path.axes).max())
+    if far > _FAR_MM or turned > _TURNED:
+        raise OutputError(
+            f"{printable(str(job.target))}: read back with tips {far:.3g} mm off and axes off by {turned:.3g}; nothing"
+            " was written: ask for more decimals, or choose another format"
+        )
+    return {"count": len(again), "largest_difference_mm": far}, ()

@@ -35,6 +35,7 @@ __all__ = [
     "contours_of",
     "refuse_twins",
     "register",
+    "unit_taken",
 ]
 
 STEP_MM = 2.0
@@ -221,7 +222,7 @@ def check_units(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> tupl
     part_size = _diagonal(part.mesh.vertices_mm)
     findings = []
     if part.source is not None and not part.source.unit_stated:
-        findings.append(_unit_taken(part.source, f"the part is {part_size:.4g} mm across", "--cad-units"))
+        findings.append(unit_taken(part.source, "--cad-units", f": the part is {part_size:.4g} mm across"))
     if scan.source is None or scan.source.unit_stated:
         return tuple(findings)
     size = _diagonal(scan.points_mm)
@@ -234,14 +235,14 @@ def check_units(scan: Scan, part: Part, contours: Mapping[int, Contour]) -> tupl
             f" it seems to be in {' or '.join(fitting)}: give {options}, or --scan-units {scan.source.unit} if it is"
             " not"
         )
-    told = f"the scan is {size:.4g} mm across, the part {part_size:.4g} mm"
-    return (*findings, _unit_taken(scan.source, told, "--scan-units"))
+    told = f": the scan is {size:.4g} mm across, the part {part_size:.4g} mm"
+    return (*findings, unit_taken(scan.source, "--scan-units", told))
 
 
-def _unit_taken(source: Source, told: str, flag: str) -> Finding:
-    return Finding(
-        409, Level.WARN, f"the file states no unit, {source.unit} was taken: {told}; state it with {flag}", source.path
-    )
+def unit_taken(source: Source, flag: str, because: str = "") -> Finding:
+    """Return the warning that a file states no unit, with the one that was taken and the flag that states it."""
+    message = f"the file states no unit, {source.unit} was taken{because}; state it with {flag}"
+    return Finding(409, Level.WARN, message, source.path)
 
 
 def _units_fitting(taken: str, size_mm: float, part_size_mm: float, least_mm: float, most_mm: float) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from sicp_cam import output, plugins
 from sicp_cam.contour.loops import mesh_loops, resampled, rim_loops
-from sicp_cam.correction import contours_of
+from sicp_cam.correction import contours_of, unit_taken
 from sicp_cam.errors import InputError, printable
 from sicp_cam.job.input_files import is_pose
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
@@ -93,7 +93,8 @@ def inspect(
 
 def _head(path: Path, role: str, source: Source | None, count: int, findings: Any) -> dict[str, Any]:
     entry = input_entry(role, source, count)
-    return {**entry, "path": str(path), "findings": findings_list(findings)}
+    taken = (unit_taken(source, "--units"),) if role != "path" and source is not None and not source.unit_stated else ()
+    return {**entry, "path": str(path), "findings": findings_list((*taken, *findings))}
 
 
 def _rounded(values: FloatArray, decimals: int) -> Any:
@@ -210,7 +211,7 @@ def _loop_entry(number: int, loop: FloatArray) -> dict[str, Any]:
 
 
 def _path_document(path: Path, tool_path: ToolPath) -> dict[str, Any]:
-    feeds = np.unique(tool_path.feeds_mm_min[~tool_path.rapid])
+    feeds = np.unique(tool_path.feeds_mm_min[~tool_path.rapid & (tool_path.feeds_mm_min > 0.0)])
     return _head(path, "path", tool_path.source, len(tool_path), tool_path.findings) | {
         "bounds": _bounds(tool_path.tips_mm),
         "name": tool_path.name,

@@ -347,6 +347,8 @@ class Program:
         them.
     source_moves
         (n,) move of the path as it was read that each move is or is a part of, see `Original`; None if not known.
+    corrected
+        False for a path that was only converted: its coordinates are in the frame that they were read in.
     """
 
     name: str
@@ -357,6 +359,7 @@ class Program:
     columns: Mapping[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
     overridden: tuple[str, ...] = ()
     source_moves: IntArray | None = None
+    corrected: bool = True
 
     def __post_init__(self) -> None:
         if len(self.status) != len(self.path):

@@ -24,10 +24,10 @@ from sicp_cam.correction import (
     contours_of,
     refuse_twins,
 )
-from sicp_cam.errors import InputError, PathError, RegistrationError, WarningsError
+from sicp_cam.errors import InputError, JobError, PathError, RegistrationError, WarningsError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
-from sicp_cam.model import FloatArray, Scan, ToolPath
+from sicp_cam.model import FloatArray, Program, Scan, Status, ToolPath
 from sicp_cam.output.names import joined
 from sicp_cam.registration.register import register_contours
 from sicp_cam.result import Correction, Inputs, input_paths, report_files, told
@@ -147,6 +147,7 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
     with clock.step("read", 0.0):
         T_start, noticed = _start(job)
         inputs = _read(job)
+    _check_posts(job, inputs.path)
     with clock.step("contour", 0.2):
         inputs = replace(inputs, part=replace(inputs.part, contours=contours_of(inputs.part)))
         wanted = None if job.contour == "auto" else job.contour
@@ -172,6 +173,32 @@ def run(job: Job, progress: Progress = _silent) -> Correction:
         if gate.state == "overridden"
     )
     return Correction(job, inputs, registration, corrected, gates, findings, clock.seconds)
+
+
+def _check_posts(job: Job, path: ToolPath) -> None:
+    """Refuse at once what the posts would only find out after the long work.
+
+    Raises
+    ------
+    JobError
+        If two posts would write one file.
+    PathError
+        If a post cannot write this path, corrected or not.
+    """
+    written: dict[str, str] = {}
+    nominal = Program(job.name, path, (Status.APPROACH,) * len(path), source_moves=np.arange(len(path)))
+    for name in job.post:
+        post = plugins.postprocessor(name, job.post_options.get(name, {}))
+        suffix = path.original.suffix if name == "same" and path.original is not None else post.suffix
+        if suffix and suffix in written:
+            raise JobError(
+                f"post: {written[suffix]} and {name} both write {job.name}{suffix}; run them into two folders"
+            )
+        written[suffix] = name
+        failed = [finding for finding in post.preflight(nominal) if finding.level is Level.FAIL]
+        if failed:
+            more = f"; and {len(failed) - 1} more" if len(failed) > 1 else ""
+            raise PathError(f"no program: post {name} cannot write this path: {told(failed[0])}{more}")
 
 
 def _start(job: Job) -> tuple[FloatArray | None, tuple[Finding, ...]]:

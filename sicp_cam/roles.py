@@ -43,7 +43,7 @@ def role_of(
     InputError
         If the file does not exist, no reader knows its suffix, or none of those that do can read it.
     JobError
-        If no role makes sense.
+        If no role makes sense, or a table may be a scan with normals as well as a path with tool axes.
     """
     name = printable(str(path))
     if not path.exists():
@@ -79,7 +79,19 @@ def _by_content(path: Path, otherwise: str, units: str | None, limits: Limits, o
         except (InputError, JobError) as no_scan:
             return "path" if _line(no_path) > _line(no_scan) else otherwise
         return otherwise
-    return otherwise if any(finding.code == _AXIS_ASSUMED for finding in moves.findings) else "path"
+    if any(finding.code == _AXIS_ASSUMED for finding in moves.findings):
+        return otherwise
+    if otherwise == "scan" and _has_normals(path, units, limits, options):
+        name = printable(str(path))
+        raise JobError(f"{name}: may be a scan with normals or a path with tool axes; say which with --role")
+    return "path"
+
+
+def _has_normals(path: Path, units: str | None, limits: Limits, options: Mapping[str, object]) -> bool:
+    try:
+        return plugins.read_scan(path, units=units, limits=limits, options=options).normals is not None
+    except (InputError, JobError):
+        return False
 
 
 def _line(error: Exception) -> int:

@@ -79,6 +79,53 @@ def test_the_unit_of_what_is_written_is_that_asked_for(scan_file):
     assert np.allclose(again.points_mm, plugins.read_scan(scan_file).points_mm, atol=1e-9, rtol=0.0)
 
 
+def test_a_unit_that_was_only_taken_does_not_become_a_fact(tmp_path):
+    source = tmp_path / "inch.xyz"
+    source.write_text("0 0 0\n1 0 0\n0 1 0\n0 0 1.5\n", encoding="ascii")
+    for name in ("b.ply", "b.asc", "b.csv"):
+        target, document = converted(source, name, role="scan")
+        assert [finding["code"] for finding in document["findings"]] == [409]
+        assert plugins.read_scan(target).source.unit_stated is False
+        assert plugins.read_scan(target, units="inch").points_mm.max() == 1.5 * 25.4
+    mesh = tmp_path / "mesh.off"
+    mesh.write_text("OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1.5\n3 0 1 2\n3 0 1 3\n", encoding="ascii")
+    for name in ("d.ply", "d.stl", "d.obj", "d.off", "d.pcd"):
+        target, _ = converted(mesh, name, role="scan")
+        assert plugins.read_scan(target).source.unit_stated is False
+        target, _ = converted(mesh, f"{name}.gz", role="scan", units="inch", out_units="inch")
+        stated = plugins.read_scan(target).source
+        assert (stated.unit, stated.unit_stated) == ("mm" if ".off" in name else "inch", ".off" not in name)
+    with pytest.raises(JobError, match="states no unit, so there is none to be changed"):
+        converted(source, "c.ply", role="scan", out_units="m")
+    target, _ = converted(source, "c.ply", role="scan", units="inch", out_units="m")
+    assert plugins.read_scan(target).points_mm.max() == pytest.approx(1.5 * 25.4)
+
+
+def test_what_a_program_reads_back_as_is_compared(tmp_path, monkeypatch):
+    source = tmp_path / "a.apt"
+    source.write_bytes(APT)
+    made = plugins.postprocessor("csv").write
+    post = plugins.postprocessor("csv")
+    monkeypatch.setattr(type(post), "write", lambda self, program: {"b.csv": _shifted(made(program)["b.csv"])})
+    with pytest.raises(OutputError, match="read back with tips 1 mm off"):
+        converted(source, "b.csv")
+    assert not (tmp_path / "b.csv").exists()
+
+
+def _shifted(table):
+    return table.replace(b"10.5000", b"11.5000")
+
+
+def test_a_program_whose_reader_must_be_told_more_is_said_not_to_be_compared(tmp_path):
+    source = tmp_path / "a.apt"
+    source.write_bytes(APT)
+    _, document = converted(source, "b.nc", out_options={"orientation": "rotary"})
+    assert document["read_back"] is None
+    assert [finding["code"] for finding in document["findings"] if finding["code"] == 652]
+    head = (tmp_path / "b.nc").read_text(encoding="ascii")
+    assert "coordinates in the path frame" in head and "scan" not in head.replace("not corrected to any scan", "")
+
+
 def test_a_packed_file_has_the_same_bytes_each_time(scan_file):
     first, _ = converted(scan_file, "b.ply.gz")
     second, _ = converted(scan_file, "c.ply.gz")

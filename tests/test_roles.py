@@ -31,6 +31,12 @@ def test_a_table_is_a_path_where_it_states_axes(tmp_path):
     assert role_of(made(tmp_path, "b.txt", POINTS)) == "scan"
 
 
+def test_normals_and_tool_axes_are_not_told_apart_by_a_guess(tmp_path):
+    table = made(tmp_path, "a.csv", "x,y,z,nx,ny,nz\n0,0,0,0,0,1\n9,0,0,0,0,1\n0,9,0,0,0,1\n")
+    with pytest.raises(JobError, match="a scan with normals or a path with tool axes; say which with --role"):
+        role_of(table)
+
+
 def test_a_program_in_a_text_file_is_a_path(tmp_path):
     assert role_of(made(tmp_path, "a.txt", "UNITS/MM\nGOTO/0,0,0\nGOTO/1,0,0,0,0,1\nFINI\n")) == "path"
 

@@ -42,6 +42,7 @@ _REFUSED = {
 }
 _TEXTS = range(1005, 1009)
 _PARAMETERS = frozenset((80, 1004, 1011, 1012, 1013, 1016, 1017, 1020, 1025, 1050))
+_MOVES_NOTHING = frozenset((4, 1000, 1001, 1002, 1014, 1027, *_TEXTS, *_PARAMETERS))
 
 
 def read_path(
@@ -66,7 +67,7 @@ def read_path(
     limits
         Caps on the file and the path.
     recover
-        Leave out a last record that is cut short.
+        Leave out a last record that is cut short and moves nothing.
     feed_mm_min
         Feed for cutting moves that the file gives none.
     chord_mm, step_mm
@@ -92,17 +93,20 @@ def read_path(
         raise FormatError(path, what, byte=content.find(b"\0"))
     moves = MoveList(path, limits, units, chord_mm, step_mm)
     reader = _Reader(moves, ignore_compensation=cutcom == "ignore")
-    records = _records(moves, program_lines(path, content, limits))
+    text = program_lines(path, content, limits)
+    records = _records(moves, text)
     for number, record in enumerate(records, 1):
         try:
             if reader.execute(record):
                 break
         except FormatError as error:
-            if number < len(records) or record.code in _REFUSED:
+            if number < len(records) or record.code not in _MOVES_NOTHING:
                 raise
             _drop_last(moves, error, recover=recover)
     else:
-        moves.note(Notice.END_MISSING, 0)
+        lines = len(text)
+        torn = bool(len(moves) and text[-1].strip()) and moves.rows[-1] == lines
+        moves.note_missing_end(lines, torn=torn)
     return moves.build(content, format="NCI", name=reader.name, feed_mm_min=feed_mm_min)
 
 

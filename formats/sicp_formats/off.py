@@ -21,7 +21,16 @@ from sicp_cam.model import FloatArray, IntArray, Part, Scan, Source
 from sicp_cam.units import mm_per_unit
 from sicp_formats.source import describe, read_bytes
 from sicp_formats.surfaces.checks import Code
-from sicp_formats.surfaces.polygons import Checked, PolygonMesh, Polygons, as_part, as_scan, checked, whole_numbers
+from sicp_formats.surfaces.polygons import (
+    Checked,
+    PolygonMesh,
+    Polygons,
+    as_part,
+    as_scan,
+    checked,
+    equal_rows,
+    whole_numbers,
+)
 from sicp_formats.tables.rows import Row, numbers, text_lines
 
 __all__ = ["read_part", "read_scan", "write_part", "write_scan"]
@@ -228,13 +237,24 @@ def _vertices(
         wanted = " or ".join(str(3 + len(names)) for names in choices)
         what = f"a vertex of {width} numbers where the keyword asks for {wanted}; COFF has colours, NOFF normals"
         raise FormatError(path, what, line=line)
-    values, lines = numbers(path, rows, width, finite=() if recover else range(width))
+    try:
+        values, lines = numbers(path, rows, width, finite=() if recover else range(width))
+    except FormatError as error:
+        if all(len(text.split()) == width for _, text in rows):
+            raise
+        what = f"{error.what}; if it is a face, the header declares too many vertices ({header.vertices}): correct it"
+        raise FormatError(path, what, line=error.line) from None
     columns = {name: values[:, 3 + i] for i, name in enumerate(names) if name not in normals}
     return values[:, :3], values[:, 3:6] if normals else None, columns, lines
 
 
 def _polygons(path: Path, rows: list[Row], limits: Limits) -> tuple[Polygons, tuple[Finding, ...]]:
     """Return the polygons; the colour that may stand behind the corners is left out."""
+    lines = np.array([line for line, _ in rows], np.int64)
+    table = equal_rows(rows)
+    if table is not None and (table[:, 0] == table.shape[1] - 1).all() and table.shape[1] <= limits.list_length:
+        named = table[:, 1:].ravel()
+        return Polygons(table[:, 0], named, named, lines), ()
     lengths, corners, coloured = np.empty(len(rows), np.int64), [], 0
     for row, (line, text) in enumerate(rows):
         count, *words = text.split()
@@ -254,7 +274,7 @@ def _polygons(path: Path, rows: list[Row], limits: Limits) -> tuple[Polygons, tu
     if coloured:
         message = f"colours of {coloured} of {len(rows)} faces were not read"
         findings = (Finding(Code.COLUMNS_NOT_USED, Level.INFO, message, str(path)),)
-    return Polygons(lengths, named, named, np.array([line for line, _ in rows], np.int64)), findings
+    return Polygons(lengths, named, named, lines), findings
 
 
 def _encoded(
@@ -271,7 +291,7 @@ def _encoded(
         colours = [columns[name] for name in _COLOURS if name in columns]
         values, keyword = np.column_stack([values, *colours]), f"C{keyword}"
     triangles = [] if faces is None else faces.tolist()
-    lines = [f"{keyword} # coordinates in {unit}", f"{len(values)} {len(triangles)} 0"]
+    lines = [keyword, f"{len(values)} {len(triangles)} 0"]
     lines += [" ".join(map(repr, row)) for row in values.tolist()]
     lines += [f"3 {a} {b} {c}" for a, b, c in triangles]
     return "\n".join([*lines, ""]).encode("ascii")

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import re
 import stat
 import tempfile
 import zlib
 from collections.abc import Iterator
+from io import FileIO
 from pathlib import Path
 
 from sicp_cam.errors import FormatError
 from sicp_cam.limits import Limits
 from sicp_cam.model import Source
 
-__all__ = ["describe", "plain_file", "read_bytes"]
+__all__ = ["LongFile", "check_kind", "describe", "plain_file", "read_bytes", "unit_to_state"]
 
 # A file that was never unpacked, or that a web server or Git put in place of the one that was asked for.
 _FOREIGN = (
@@ -47,29 +49,91 @@ def read_bytes(path: Path, limits: Limits) -> bytes:
         unpacks to more than that or than `limits.archive_ratio` allows, or is another archive, an HTML page, a PDF or
         a Git LFS pointer.
     """
-    try:
-        status = path.stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise FormatError(path, "is a folder; name a file in it")
-        if not stat.S_ISREG(status.st_mode):
-            raise FormatError(path, "is no regular file (a device or a pipe); copy the data into a file first")
-        _check_size(path, status.st_size, limits)
+    with _told(path):
+        _status(path, limits)
         content = path.read_bytes()
-    except FileNotFoundError:
-        raise FormatError(path, "no such file; check the name and the folder") from None
-    except OSError as error:
-        raise FormatError(path, f"cannot be read ({error.strerror or error})") from None
-    except FormatError:
-        raise
-    except ValueError as error:  # a NUL in the name
-        raise FormatError(path, f"is no possible file name ({error})") from None
     _check_size(path, len(content), limits)
     if path.suffix.lower() == ".gz":
         content = _unpacked(path, content, limits)
-    for signature, meaning in _FOREIGN:
-        if signature.match(content[:1024]):
-            raise FormatError(path, f"is {meaning}", byte=0)
+    check_kind(path, content)
     return content
+
+
+class LongFile:
+    """A file that is read in places, so that it never lies in memory as a whole.
+
+    Parameters
+    ----------
+    path
+        The file; a packed one is not unpacked.
+    limits
+        The cap on its size.
+
+    Raises
+    ------
+    FormatError
+        As `read_bytes` does.
+    """
+
+    def __init__(self, path: Path, limits: Limits) -> None:
+        self.path = path
+        with _told(path):
+            status = _status(path, limits)
+        self._size, self._written = status.st_size, status.st_mtime_ns
+        check_kind(path, self.head(1024))
+
+    def __len__(self) -> int:
+        return self._size
+
+    def head(self, size: int) -> bytes:
+        """Return the first bytes, fewer if there are no more."""
+        return b"".join(self.blocks(0, min(size, self._size), size))
+
+    def blocks(self, begin: int, end: int, size: int) -> Iterator[memoryview]:
+        """Yield the bytes from `begin` to `end`, so many at a time; each block takes the memory of the one before.
+
+        Raises
+        ------
+        FormatError
+            If the file can no longer be read, or is not what it was.
+        """
+        memory = memoryview(bytearray(min(size, end - begin)))
+        with self._opened() as file:
+            file.seek(begin)
+            for start in range(begin, end, size):
+                block = memory[: end - start]
+                filled = 0
+                while filled < len(block):
+                    more = file.readinto(block[filled:])
+                    if not more:
+                        raise self._changed()
+                    filled += more
+                yield block
+
+    def whole(self) -> bytes:
+        """Return all bytes."""
+        with self._opened() as file:
+            content = file.read()
+        if len(content) != self._size:
+            raise self._changed()
+        return content
+
+    def sha256(self) -> str:
+        """Return the SHA-256 of all bytes in hexadecimal digits."""
+        with self._opened() as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+
+    @contextlib.contextmanager
+    def _opened(self) -> Iterator[FileIO]:
+        """Open the file and see that it is still the same: what is read in places must belong together."""
+        with _told(self.path), self.path.open("rb", buffering=0) as file:
+            yield file
+            status = os.fstat(file.fileno())
+        if (status.st_size, status.st_mtime_ns) != (self._size, self._written):
+            raise self._changed()
+
+    def _changed(self) -> FormatError:
+        return FormatError(self.path, "was written to while it was read; read it again when it is complete")
 
 
 @contextlib.contextmanager
@@ -92,7 +156,7 @@ def plain_file(path: Path, content: bytes) -> Iterator[Path]:
         yield copy
 
 
-def describe(path: Path, content: bytes, *, format: str, unit: str, unit_stated: bool) -> Source:
+def describe(path: Path, content: bytes | LongFile, *, format: str, unit: str, unit_stated: bool) -> Source:
     """Return the record of an input: its name, format, unit, and the SHA-256 of the file, packed if it is packed.
 
     >>> describe(Path("a.ply"), b"", format="PLY", unit="mm", unit_stated=False).sha256[:8]
@@ -100,7 +164,55 @@ def describe(path: Path, content: bytes, *, format: str, unit: str, unit_stated:
     """
     if path.suffix.lower() == ".gz":
         content = path.read_bytes()
-    return Source(str(path), format, hashlib.sha256(content).hexdigest(), unit, unit_stated)
+    sha256 = content.sha256() if isinstance(content, LongFile) else hashlib.sha256(content).hexdigest()
+    return Source(str(path), format, sha256, unit, unit_stated)
+
+
+def check_kind(path: Path, content: bytes) -> None:
+    """Refuse a file whose first 1024 bytes are those of an archive, an HTML page, a PDF or a Git LFS pointer.
+
+    Raises
+    ------
+    FormatError
+        With what it is.
+    """
+    for signature, meaning in _FOREIGN:
+        if signature.match(content[:1024]):
+            raise FormatError(path, f"is {meaning}", byte=0)
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Turn what the system says of a file into a FormatError."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise FormatError(path, "no such file; check the name and the folder") from None
+    except OSError as error:
+        raise FormatError(path, f"cannot be read ({error.strerror or error})") from None
+    except FormatError:
+        raise
+    except ValueError as error:  # a NUL in the name
+        raise FormatError(path, f"is no possible file name ({error})") from None
+
+
+def _status(path: Path, limits: Limits) -> os.stat_result:
+    """Return what the system knows of a regular file of a possible size."""
+    status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
+        raise FormatError(path, "is a folder; name a file in it")
+    if not stat.S_ISREG(status.st_mode):
+        raise FormatError(path, "is no regular file (a device or a pipe); copy the data into a file first")
+    _check_size(path, status.st_size, limits)
+    return status
+
+
+def unit_to_state(source: Source | None, unit: str) -> str:
+    """Return the unit that a writer may state, "" where millimetres were only taken, because no one said otherwise.
+
+    A writer that stated such a unit would make a fact of it.
+    """
+    return unit if source is None or source.unit_stated or source.unit != "mm" else ""
 
 
 def _unpacked(path: Path, packed: bytes, limits: Limits) -> bytes:

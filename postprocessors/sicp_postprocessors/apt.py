@@ -11,7 +11,7 @@ from sicp_cam.findings import Finding, Level
 from sicp_cam.model import Event, EventKind, Program
 from sicp_cam.units import mm_per_unit
 from sicp_postprocessors.base import LinePostprocessor, Move, failures
-from sicp_postprocessors.checks import frame_findings, in_scan_frame, stretch_findings
+from sicp_postprocessors.checks import frame_findings, frame_name, stretch_findings
 from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.numbers import fixed, trimmed
 from sicp_postprocessors.options import outside
@@ -85,10 +85,8 @@ class Apt(LinePostprocessor):
 
     def remarks(self, program: Program) -> Iterator[str]:
         """Return in which frame the coordinates are."""
-        if in_scan_frame(program):
-            yield "coordinates in the scan frame"
-        else:
-            yield "coordinates in the part frame"
+        yield f"coordinates in the {frame_name(program)} frame"
+        if frame_name(program) == "part":
             yield f"its pose in the scan frame: {pose_words(program.T_scan_program)}"
 
     def setup(self, program: Program) -> Iterator[str]:

@@ -27,6 +27,7 @@ __all__ = [
     "event_place",
     "first_move_findings",
     "frame_findings",
+    "frame_name",
     "in_scan_frame",
     "move_place",
     "name_findings",
@@ -135,6 +136,13 @@ def first_move_findings(path: ToolPath) -> list[Finding]:
 def in_scan_frame(program: Program) -> bool:
     """Say whether the coordinates are those of the scan; otherwise the program keeps the part's own."""
     return np.array_equal(program.T_scan_program, np.eye(4))
+
+
+def frame_name(program: Program) -> str:
+    """Return whose frame the coordinates are in: scan, part, or path where nothing was corrected."""
+    if not program.corrected:
+        return "path"
+    return "scan" if in_scan_frame(program) else "part"
 
 
 def frame_findings(program: Program, level: Level, remedy: str) -> list[Finding]:

@@ -58,6 +58,7 @@ class Dxf(Postprocessor):
     name = "dxf"
     summary = "DXF drawing (R2000) of the tips as 3D polylines, cuts and rapid moves on layers"
     Options = DxfOptions
+    suffix = ".dxf"
     missing_feed = Level.INFO
     options: DxfOptions
 
@@ -83,7 +84,7 @@ class Dxf(Postprocessor):
         entities = [line for run in runs for line in _polyline(run, tips, corner, handles)]
         layers = {layer: _COLOURS[layer] for layer in sorted({run.layer for run in runs})}
         text = document(remarks, layers, entities, next(handles))
-        return {f"{file_stem(program.name)}.dxf": text.encode("ascii")}
+        return {file_stem(program.name) + self.suffix: text.encode("ascii")}
 
 
 def _runs(program: Program, *, by_status: bool) -> list[_Run]:

@@ -12,7 +12,7 @@ from sicp_cam.findings import Finding, Level
 from sicp_cam.model import Event, EventKind, FloatArray, Program
 from sicp_cam.units import mm_per_unit
 from sicp_postprocessors.base import LinePostprocessor, Move, failures
-from sicp_postprocessors.checks import frame_findings, in_scan_frame, move_place, stretch_findings
+from sicp_postprocessors.checks import frame_findings, frame_name, move_place, stretch_findings
 from sicp_postprocessors.gcode_options import GCodeOptions
 from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.numbers import fixed, rounded, trimmed
@@ -73,8 +73,8 @@ class GCode(LinePostprocessor):
         offset = f"work offset {options.work_offset}" if options.work_offset else "active work offset"
         yield options.control
         yield f"units {options.units}, dwell in {dwell}"
-        yield f"coordinates in the {_frame(program)} frame: the {offset} must hold it"
-        if _frame(program) == "part":
+        yield f"coordinates in the {frame_name(program)} frame: the {offset} must hold it"
+        if frame_name(program) == "part":
             yield f"its pose in the scan frame: {pose_words(program.T_scan_program)}"
 
     def setup(self, program: Program) -> Iterator[str]:
@@ -174,7 +174,7 @@ class GCode(LinePostprocessor):
         if self.options.work_offset:
             return []
         message = (
-            f"no work offset is written: the coordinates are those of the {_frame(program)} frame, and the active "
+            f"no work offset is written: the coordinates are those of the {frame_name(program)} frame, and the active "
             f"offset must hold that frame; name one with {flag(self.name, 'work_offset', 'G54')}"
         )
         return [Finding(623, Level.INFO, message)]
@@ -228,7 +228,3 @@ class GCode(LinePostprocessor):
         if self._dwell_word() == "P_MS":
             return f"G4 P{fixed(round(seconds * 1000.0), 0)}"
         return f"G4 {self._dwell_word()}{fixed(seconds, 3)}"
-
-
-def _frame(program: Program) -> str:
-    return "scan" if in_scan_frame(program) else "part"

@@ -63,7 +63,7 @@ class Same(Postprocessor):
 def _refusals(program: Program) -> list[Finding]:
     cannot = "the program cannot be written again in its own words"
     if program.path.original is None:
-        why = "its format is not one that is (APT, CL and G-code are); use another post"
+        why = "its format cannot be written again (APT, CL, G-code and CSV can); use another post"
         return [Finding(650, Level.FAIL, f"{cannot}: {why}")]
     if program.source_moves is None:
         return [Finding(650, Level.FAIL, f"{cannot}: which of its moves is which is not known; use another post")]

@@ -10,7 +10,7 @@ import re
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import EventKind, FloatArray, Program
 from sicp_postprocessors.base import Postprocessor, failures, head_remarks
-from sicp_postprocessors.checks import event_findings, first_move_findings, in_scan_frame, name_findings
+from sicp_postprocessors.checks import event_findings, first_move_findings, frame_name, in_scan_frame, name_findings
 from sicp_postprocessors.numbers import LARGEST, trimmed
 from sicp_postprocessors.options import flag
 from sicp_postprocessors.text import ascii_name
@@ -141,10 +141,11 @@ class Val3(Postprocessor):
     def _frame_remark(self, program: Program) -> str:
         """Return what fPart is the pose of: the scan frame, or the part in it where the points keep its coordinates."""
         if self.options.cell is None:
-            pose = "the scan frame" if in_scan_frame(program) else "the part in the scan frame"
-            return f"fPart is the pose of {pose}; no cell is given, so the scan frame is taken as the robot's world"
+            pose = f"the {frame_name(program)} frame" if in_scan_frame(program) else "the part in the scan frame"
+            taken = f"the {'scan' if program.corrected else 'path'} frame"
+            return f"fPart is the pose of {pose}; no cell is given, so {taken} is taken as the robot's world"
         if in_scan_frame(program):
-            return "fPart is the pose of the scan frame in the robot's world: the option cell"
+            return f"fPart is the pose of the {frame_name(program)} frame in the robot's world: the option cell"
         return "fPart is the pose of the part in the robot's world: the option cell times its pose in the scan frame"
 
     def _world_remark(self) -> str:

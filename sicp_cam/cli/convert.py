@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from sicp_cam.cli.reader_settings import Unit
 from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
 
 __all__ = ["convert"]
@@ -18,8 +19,8 @@ def convert(
     /,
     *,
     role: Literal["scan", "part", "path"] | None = None,
-    units: Annotated[str | None, Parameter(alias=["--scan-units", "--cad-units", "--path-units"])] = None,
-    out_units: str = "mm",
+    units: Annotated[Unit | None, Parameter(alias=["--scan-units", "--cad-units", "--path-units"])] = None,
+    out_units: Unit | None = None,
     post: str | None = None,
     recover: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     force: Annotated[bool, Parameter(negative="", show_default=False)] = False,
@@ -43,7 +44,7 @@ def convert(
     units
         Unit of the numbers read, where the file does not state one: mm, cm, m, inch.
     out_units
-        Unit of the numbers written.
+        Unit of the numbers written; mm if left out.
     post
         Postprocessor of a path, where the suffix does not tell, such as val3.
     recover

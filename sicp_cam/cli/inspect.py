@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from sicp_cam.cli.reader_settings import Unit
 from sicp_cam.cli.session import Talk, logging_to, reported, say, say_json
 
 __all__ = ["inspect"]
@@ -19,7 +20,7 @@ def inspect(
     /,
     *,
     role: Role | None = None,
-    units: Annotated[str | None, Parameter(alias=["--scan-units", "--cad-units", "--path-units"])] = None,
+    units: Annotated[Unit | None, Parameter(alias=["--scan-units", "--cad-units", "--path-units"])] = None,
     picture: Path | None = None,
     recover: Annotated[bool, Parameter(negative="", show_default=False)] = False,
     force: Annotated[bool, Parameter(negative="", show_default=False)] = False,
@@ -70,10 +71,7 @@ def _run(
 ) -> int:
     from sicp_cam.cli.inspect_lines import inspect_lines
     from sicp_cam.cli.reader_settings import reader_settings
-    from sicp_cam.units import mm_per_unit
 
-    if units is not None:
-        mm_per_unit(units)
     chosen = role or _role(file, units, pairs)
     limits, tables = reader_settings(pairs, [chosen])
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Literal, TypeAlias
 
 from sicp_cam.errors import JobError, printable
 from sicp_cam.job.layers import settings
 from sicp_cam.limits import Limits
 from sicp_cam.options.values import table
 
-__all__ = ["reader_settings"]
+__all__ = ["Unit", "reader_settings"]
+
+Unit: TypeAlias = Literal["mm", "cm", "m", "inch"]
+"""What --units takes."""
 
 
 def reader_settings(pairs: Iterable[str], tables: Sequence[str]) -> tuple[Limits, dict[str, dict[str, object]]]:

@@ -186,6 +186,13 @@ def writable_roles(path: Path) -> tuple[str, ...]:
     return tuple(role for role in ROLES if f"{role}.{suffix_of(path)}" in claims)
 
 
+def writable_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of everything that can be written into one file, in order."""
+    scans_and_parts = {name.partition(".")[2] for name in owners(WRITERS)}
+    posts = {getattr(owner(each).load(), "suffix", "").removeprefix(".") for each in owners(POSTPROCESSORS).values()}
+    return tuple(sorted((scans_and_parts | posts) - {""}))
+
+
 def encoded(
     role: str, path: Path, thing: Scan | Part, *, unit: str = "mm", options: Mapping[str, object] = _NO_OPTIONS
 ) -> bytes:

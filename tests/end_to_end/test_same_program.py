@@ -67,7 +67,8 @@ def test_convert_says_what_it_did(cli, bench, tmp_path):
     [
         (["--set", "scann.decimal=,"], 2, "must begin with one of scan., part., path., out., limits."),
         (["--set", "out.encodin=ascii"], 2, "out.encodin: unknown option; did you mean encoding?"),
-        (["--out-units", "furlong"], 3, "unknown unit 'furlong'"),
+        (["--out-units", "furlong"], 2, "--out-units. Choose from"),
+        (["--out-units", "inch"], 2, "states no unit, so there is none to be changed; state it with --units"),
         (["--role", "path"], 3, "no reader for a path"),
     ],
 )

@@ -124,6 +124,29 @@ def test_feed_per_revolution_follows_the_spindle(tmp_path: Path) -> None:
     assert codes(path) == {302}
 
 
+def test_a_feed_per_revolution_without_a_speed_is_told_as_what_it_is(tmp_path: Path) -> None:
+    moves = "GOTO/0,0,0\nGOTO/1,0,0\nRAPID\nGOTO/2,0,0\nGOTO/3,0,0\nFINI"
+    path = read(tmp_path, "UNITS/MM\nSPINDL/SFM,300,CLW\nFEDRAT/0.3,MMPR\n" + moves)
+    (found,) = [f for f in path.findings if f.code == 302]
+    assert found.message.startswith("3 cutting moves have no feed that is known in mm/min (3 state it per revolution")
+    assert "no speed in rev/min is stated" in found.message and "path.feed_mm_min" in found.message
+    (found,) = read(tmp_path, "UNITS/MM\n" + moves).findings
+    assert "revolution" not in found.message
+    assert codes(read(tmp_path, "UNITS/MM\nFEDRAT/0.3,MMPR\nSPINDL/900\n" + moves)) == set()
+
+
+def test_numbered_statements_are_read(tmp_path: Path) -> None:
+    text = (
+        "N1 UNITS/MM\nN2 FEDRAT/9\nN3GOTO/0,0,0\nn7 goto / 1,2,$\n3\n"
+        "N20 RAPID\nN30 GOTO/0,0,9\nN4 PPRINT $ text\nN5 FINI"
+    )
+    path = read(tmp_path, text)
+    assert path.tips_mm.tolist() == [[0, 0, 0], [1, 2, 3], [0, 0, 9]]
+    assert path.feeds_mm_min.tolist() == [9, 9, 0]
+    assert [e.text for e in path.events] == ["$ text"]
+    assert codes(path) == set()
+
+
 def test_rapid_holds_for_one_move(tmp_path: Path) -> None:
     path = read(tmp_path, HEAD + "RAPID/\nGOTO/0,0,0\nGOTO/1,0,0\nRAPID\nGODLTA/0,0,5\nGOTO/9,0,0\nFINI")
     assert path.rapid.tolist() == [True, False, True, False]
@@ -296,13 +319,17 @@ def test_makino_sections_and_every_layout_of_a_point() -> None:
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("GOTO/0,0,0\nGOTO/1,0,0\nGOTO/2,0\n", 5, "3 numbers"),
-        ("GOTO/0,0,0\nGOTO/1,0,0\nGOTO/2,0,$\n", 5, "file ends"),
-        ("GOTO/0,0,0\nGOTO/1,0,0\nCIRCLE/0,0,0,0,0,1,1\n", 5, "without the GOTO"),
-        ("GOTO/0,0,0\nGOTO/1,0,0\nCIRCLE/0,0,\n\n", 5, "CIRCLE"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\nCUTTER/10,$\n", 5, "file ends"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\nN9 SPINDL/900,$\n\n", 5, "file ends"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\nTLAXIS/0,\n", 5, "TLAXIS needs"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\nUNITS/", 5, "UNITS needs"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\nCUTCOM/LE", 5, "CUTCOM"),
+        ("GOTO/0,0,0\nGOTO/1,0,0\n$$-> CSYS / 1,0 $", 5, "file ends"),
     ],
 )
-def test_a_last_statement_that_is_cut_short_can_be_left_out(tmp_path: Path, text: str, line: int, words: str) -> None:
+def test_a_last_statement_that_is_cut_short_and_moves_nothing_can_be_left_out(
+    tmp_path: Path, text: str, line: int, words: str
+) -> None:
     refused(tmp_path, HEAD + text, line, words, "--recover")
     path = read(tmp_path, HEAD + text, recover=True)
     assert path.tips_mm.tolist() == [[0, 0, 0], [1, 0, 0]]
@@ -310,6 +337,44 @@ def test_a_last_statement_that_is_cut_short_can_be_left_out(tmp_path: Path, text
     (dropped,) = [f for f in path.findings if f.code == 350]
     assert dropped.level is Level.WARN
     assert dropped.where.endswith("line 5")
+
+
+@pytest.mark.parametrize(
+    "cut",
+    [
+        *("GOTO/2,0\n", "GOTO/-4", "GOTO/2,0,$\n", "N7 GOTO/2,$", "L1) GOTO/2,", "GODLTA/1", "FROM/0,0\n", "GOHOME/1"),
+        *("CIRCLE/0,0,0,0,0,1,1\n", "CIRCLE/0,0,\n\n", "INDIRV/1,0\n", "TLON,GOFWD/(CIRCLE/1,0\n", "GOT", "3.,4.\n"),
+        *("CYCLE/DRI", "HELIX/1,2"),
+    ],
+)
+def test_a_cut_motion_is_never_left_out(tmp_path: Path, cut: str) -> None:
+    text = HEAD + "GOTO/0,0,0\nGOTO/1,0,0\n" + cut
+    for recover in (False, True):
+        with pytest.raises(FormatError) as caught:
+            read(tmp_path, text, recover=recover)
+        assert caught.value.line == 5
+        assert "--recover" not in str(caught.value)
+
+
+def test_an_arc_that_waits_is_not_left_out_with_what_follows_it(tmp_path: Path) -> None:
+    text = HEAD + "GOTO/0,0,0\nGOTO/1,0,0\nCIRCLE/0,0,0,0,0,1,1\nFEDRAT/$\n"
+    refused(tmp_path, text, 5, "without the GOTO", recover=True)
+
+
+def test_a_program_without_end_that_ends_in_a_cut_is_a_warning(tmp_path: Path) -> None:
+    def level(rest: str) -> Level:
+        (found,) = [f for f in read(tmp_path, HEAD + "GOTO/0,0,0\nGOTO/9,0,0\n" + rest).findings if f.code == 316]
+        assert ("ends in a cut" in found.message) == (found.level is Level.WARN)
+        return found.level
+
+    assert level("") is Level.WARN
+    assert level("GOTO/9,0,-5\n") is Level.WARN
+    assert level("RAPID\nGOTO/9,0,50\n") is Level.INFO
+    assert level("GOTO/9,0,50\n") is Level.INFO  # straight off the part
+    assert level("GOTO/9,0,50\nCOOLNT/OFF") is Level.INFO
+    # 5 may have been 50: the line has no end
+    assert level("RAPID\nGOTO/9,0,5") is Level.WARN
+    assert level("RAPID\nGOTO/9,0,$\n5") is Level.WARN
 
 
 def test_a_damaged_motion_in_the_middle_is_never_repaired(tmp_path: Path) -> None:
@@ -500,6 +565,17 @@ MOVES = "GOTO/0,0,0\nGOTO/1,0,0\nFINI\n"
         ("GOHOME\n", 3, ["GOHOME"]),
         ("GOTO/0,0,0\nFROM/5,0,0\n", 4, ["FROM"]),
         ("GOTP/1,2,3\n", 3, ["GOTP"]),
+        ("AA=GOTO/1,0,0\n", 3, ["APT language"]),
+        ("AA=GOHOME\n", 3, ["APT language"]),
+        ("MOVARC/0,0,0,0,0,1,5\n", 3, ["moves the tool", "GOTO"]),
+        ("HELIX/1\n", 3, ["moves the tool"]),
+        ("MOVETO/1,2,3\n", 3, ["moves the tool"]),
+        ("POSITN/X,5\n", 3, ["moves the tool"]),
+        ("TRANSL/1,0,0\n", 3, ["frame"]),
+        ("COORD/1,0,0\n", 3, ["frame"]),
+        ("DEFSUB/1\n", 3, ["APT language"]),
+        ("CALSUB/1\n", 3, ["APT language"]),
+        ("ENDSUB\n", 3, ["APT language"]),
         ("CYCLE/DRILL,5\n", 3, ["drilling"]),
         ("CUTCOM/LEFT,XYPLAN\n", 3, ["tool radius"]),
         ("TRANS/0,0,5\n", 3, ["frame"]),

@@ -311,8 +311,50 @@ def test_paths_of_other_moves_feeds_or_repaired_programs_are_refused(tmp_path: P
     refused(rewritten(path, np.array([0, 1])), "all moves")
     refused(rewritten(replace(path, feeds_mm_min=path.feeds_mm_min * 2)), "feeds")
     refused(rewritten(replace(path, rapid=~path.rapid)), "rapid")
-    refused(rewritten(read(tmp_path, text + "GOTO/3,0\n", recover=True)), "damaged")
+    refused(rewritten(read(tmp_path, text + "TLAXIS/0\n", recover=True)), "damaged")
     refused(rewritten(read(tmp_path, text.replace("FEDRAT/600,MMPM\n", ""), feed_mm_min=500.0)), "feed_mm_min")
+
+
+def test_numbers_of_unknown_statements_do_not_stay_behind_a_correction(tmp_path: Path) -> None:
+    text = HEAD + "GOTO/0,0,0\nAVOID/1,2,3\nSOFT/1,2\nGOTO/1,0,0\nFINI\n"
+    path = read(tmp_path, text)
+    assert rewritten(path).content == text.encode()
+    refused(rewritten(shifted(path, (0.5, 0.0, 0.0))), "not known", "AVOID (line 4)")
+    lines(rewritten(shifted(read(tmp_path, text.replace("AVOID", "CUTTER")), (0.5, 0.0, 0.0))))
+
+
+def test_numbers_of_statements_stay(tmp_path: Path) -> None:
+    path = read(tmp_path, HEAD + "N10 GOTO/0,0,0\nN20 RAPID\nN30GOTO / 1,0,0 $$ up\nN40 FINI\n")
+    assert lines(rewritten(shifted(path, (0.0, 0.0, 0.5))))[2:] == [
+        "N10 GOTO/0,0,0.5", "N20 RAPID", "N30GOTO / 1,0,0.5 $$ up", "N40 FINI",
+    ]  # fmt: skip
+    sources = np.array([0, 1, 1])
+    tips = np.array([[0.0, 0, 0], [0.5, 0, 0.5], [1.0, 0, 0]])
+    more = replace(path, tips_mm=tips, axes=path.axes[sources], feeds_mm_min=path.feeds_mm_min[sources],
+                   rapid=path.rapid[sources], lines=path.lines[sources])  # fmt: skip
+    assert lines(rewritten(more, sources))[3:7] == [
+        "N20 RAPID", "GOTO / 0.5,0,0.5", "RAPID", "N30GOTO / 1,0,0 $$ up",
+    ]  # fmt: skip
+
+
+def test_a_remark_within_a_statement_is_written_once(tmp_path: Path) -> None:
+    path = read(tmp_path, HEAD + "GOTO/0,0,0\nGOTO/1,0,$ more $$ why\n0 $$ end\nFINI\n")
+    sources = np.array([0, 1, 1])
+    tips = np.array([[0.0, 0, 0], [0.5, 0.5, 0], [1.0, 0, 0]])
+    more = replace(path, tips_mm=tips, axes=path.axes[sources], feeds_mm_min=path.feeds_mm_min[sources],
+                   rapid=path.rapid[sources], lines=path.lines[sources])  # fmt: skip
+    written = lines(rewritten(more, sources))
+    assert written[2:] == ["GOTO/0,0,0", "GOTO/0.5,0.5,0", "GOTO/1,0,$ more $$ why", "0 $$ end", "FINI"]
+
+
+def test_what_was_written_is_not_refused_for_the_sense_of_its_arcs(tmp_path: Path) -> None:
+    arc = "GOTO/1,0,0\nCIRCLE/0,0,0,0,0,1,1\nGOTO/0,1,0\n"
+    path = read(tmp_path, HEAD + "GOTO/1,-5,0\n" + arc + "GOTO/-5,1,0\nFINI\n")
+    tips = path.tips_mm.copy()
+    tips[0] = [1.0, 5.0, 0.0]  # now the moves beside the arc run against it
+    tips[-1] = [5.0, 1.0, 0.0]
+    written = lines(rewritten(replace(path, tips_mm=tips)))
+    assert written[2:] == ["GOTO/1,5,0", *arc.splitlines(), "GOTO/5,1,0", "FINI"]
 
 
 def test_what_would_not_read_back_is_refused(tmp_path: Path) -> None:

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sicp_cam.errors import FormatError, JobError
-from sicp_cam.findings import Level
+from sicp_cam.errors import FormatError, JobError, UnitError
 from sicp_cam.limits import Limits
 from sicp_formats.ascii import read_scan
 
@@ -79,11 +78,9 @@ INTENSITY = np.array([-1613.0, 0.5, 3.0, 17.0])
 @pytest.mark.parametrize(
     ("values", "normals"),
     [
-        (stacked(POINTS, INTENSITY), False),
         (stacked(POINTS, NORMALS), True),
         (stacked(POINTS, COLOURS), False),
         (stacked(POINTS, NORMALS, INTENSITY), True),
-        (stacked(POINTS, INTENSITY, NORMALS), True),
         (stacked(POINTS, INTENSITY, COLOURS), False),
         (stacked(POINTS, COLOURS, INTENSITY), False),
         (stacked(POINTS, COLOURS, NORMALS), True),
@@ -108,6 +105,8 @@ def test_columns_that_the_numbers_prove(tmp_path: Path, values: np.ndarray, norm
     [
         stacked(POINTS, 2.0 * NORMALS),
         stacked(POINTS, COLOURS + 200),
+        stacked(POINTS, INTENSITY),
+        stacked(POINTS, INTENSITY, NORMALS),
         stacked(POINTS, INTENSITY, INTENSITY),
         stacked(POINTS, INTENSITY, INTENSITY, NORMALS),
         stacked(COLOURS, COLOURS),
@@ -156,9 +155,8 @@ def test_units(tmp_path: Path) -> None:
     scan = read_scan(path)
     assert np.allclose(scan.points_mm, 1000 * POINTS, rtol=1e-15)
     assert scan.source is not None and (scan.source.unit, scan.source.unit_stated) == ("m", True)
-    overruled = read_scan(path, units="mm")
-    assert np.array_equal(overruled.points_mm, POINTS)
-    assert [(each.code, each.level) for each in overruled.findings] == [(112, Level.WARN)]
+    with pytest.raises(UnitError, match="line 1: the file states m, the job mm"):
+        read_scan(path, units="mm")
     plain = read_scan(write(tmp_path, GERMAN)).source
     assert plain is not None and (plain.unit, plain.unit_stated, plain.format) == ("mm", False, "ASCII")
 

@@ -14,12 +14,14 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from sicp_cam.errors import FormatError, InputError, JobError, UnitError
+from sicp_cam.findings import Level
 from sicp_cam.limits import Limits
 from sicp_cam.model import FloatArray, ToolPath
 from sicp_formats.dxf import read_path
 
 CORPUS = Path(__file__).parents[1] / "corpus" / "dxf"
 FEED_AND_AXIS = {302, 303}
+NO_RETRACT = 366
 SQUARE = ("LINE|8 0|10 0|20 0|11 9|21 0", "LINE|8 0|10 9|20 0|11 9|21 9", "LINE|8 0|10 9|20 9|11 0|21 0")
 
 
@@ -53,7 +55,7 @@ def read(tmp_path: Path, text: str | bytes, **options: object) -> ToolPath:
 
 
 def codes(path: ToolPath) -> set[int]:
-    return {finding.code for finding in path.findings} - FEED_AND_AXIS
+    return {finding.code for finding in path.findings} - FEED_AND_AXIS - {NO_RETRACT}
 
 
 def message(path: ToolPath, code: int) -> str:
@@ -318,9 +320,41 @@ def test_order_direction_start_and_axis(tmp_path: Path) -> None:
     assert np.allclose(chains(started)[1][0], [300, -1, 0], atol=0.2)
 
 
+TWO_LINES = drawing("LINE|8 0|10 0|20 0|30 -5|11 9|21 0|31 3", "LINE|8 0|10 50|20 0|30 1|11 59|21 0|31 1")
+
+
+def test_rapid_moves_at_the_height_of_the_drawing_are_told(tmp_path: Path) -> None:
+    path = read(tmp_path, TWO_LINES)
+    assert path.rapid.tolist() == [True, False, True, False]
+    (found,) = [finding for finding in path.findings if finding.code == NO_RETRACT]
+    assert found.level is Level.WARN and "2 rapid moves" in found.message
+    assert "--set path.clearance_mm=" in found.message
+    assert message(read(tmp_path, drawing(*SQUARE)), NO_RETRACT).count("1 rapid moves") == 1
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.0, 3.0, 4.0), (0.0, 0.0, -1e-5)])
+def test_a_clearance_lifts_all_rapid_moves_over_the_highest_point(
+    tmp_path: Path, axis: tuple[float, float, float]
+) -> None:
+    path = read(tmp_path, TWO_LINES, clearance_mm=10.0, axis=axis, feed_mm_min=500.0)
+    up = np.array(axis) / np.linalg.norm(axis)
+    height = path.tips_mm @ up
+    assert path.rapid.tolist() == [True, False, False, True] * 2
+    assert np.allclose(height[path.rapid], height[~path.rapid].max() + 10.0)
+    assert (path.feeds_mm_min[~path.rapid] == 500.0).all()
+    plain = read(tmp_path, TWO_LINES, axis=axis)
+    assert np.array_equal(path.tips_mm[~path.rapid], plain.tips_mm)
+    # straight down along the axis, and straight up
+    along = np.diff(path.tips_mm, axis=0)[[0, 2, 4, 6]]
+    assert np.allclose(np.cross(along, up), 0.0) and ((along @ up > 0.0) == [False, True, False, True]).all()
+    assert NO_RETRACT not in {finding.code for finding in path.findings}
+
+
 @pytest.mark.parametrize(
     "options",
     [
+        {"clearance_mm": 0.0},
+        {"clearance_mm": math.inf},
         {"gap_mm": -1.0},
         {"gap_mm": math.nan},
         {"axis": (0.0, 0.0, 0.0)},
@@ -362,7 +396,7 @@ BAD = {
     "empty": (b"", None, "empty"),
     "hello": ("hello\n", 1, "holds no section"),
     "no section": ("9\n$ACADVER\n", 1, "holds no section"),
-    "words": ("hello\nworld\n", 1, "group code 'hello'", "--recover"),
+    "words": ("hello\nworld\n", 1, "group code 'hello'", "Export it again"),
     "DWG": (b"AC1015\0\0\0\0\0\0\1", None, "DWG", "save the drawing as DXF"),
     "UTF-16": (drawing(*SQUARE).encode("utf-16"), None, "UTF-16"),
     "no EOF": (drawing(*SQUARE).replace("0\nEOF\n", ""), 56, "no end (EOF)", "--recover"),
@@ -475,6 +509,31 @@ def test_repairs_are_told(tmp_path: Path) -> None:
     refused(tmp_path, swapped, 62, "y coordinate", "--recover")
     assert chains(read(tmp_path, swapped, recover=True))[1].tolist() == [[20, 0, 0], [29, 0, 0]]
     assert 362 in codes(read(tmp_path, drawing(*SQUARE, "LINE|8 0|10 1|20 1|11 1|21 1")))
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_a_repair_is_offered_for_is_repaired(tmp_path: Path, case: str) -> None:
+    text = BAD[case][0]
+    if case == "missing block":  # and some curve beside it
+        text = drawing(*SQUARE, "INSERT|8 0|5 A1|2 GONE|10 0|20 0")
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text)
+    if "--recover" in str(caught.value):
+        assert codes(read(tmp_path, text, recover=True)) & {360, 362, 363}
+    else:
+        with pytest.raises(InputError):
+            read(tmp_path, text, recover=True)
+
+
+def test_a_drawing_that_lost_curves_is_never_repaired(tmp_path: Path) -> None:
+    whole = drawing(*SQUARE)
+    for cut, recover in itertools.product(range(1, whole.index("0\nENDSEC\n0\nEOF") + 3, 3), (False, True)):
+        with pytest.raises(InputError) as caught:
+            read(tmp_path, whole[:cut], recover=recover)
+        if cut > whole.index("ENTITIES") + 9:
+            assert "--recover" not in str(caught.value)
+    swapped = whole.replace("11\n9\n", "eleven\n9\n", 1)
+    refused(tmp_path, swapped, 27, "group code 'eleven'", "Export it again", recover=True)
 
 
 def test_nothing_is_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

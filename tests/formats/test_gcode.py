@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from sicp_cam.errors import FormatError, JobError, UnitError
+from sicp_cam.findings import Level
 from sicp_cam.limits import Limits
 from sicp_cam.model import EventKind, ToolPath
 from sicp_formats.gcode import read_path
 from sicp_formats.gcode.axis import angles_near, axis_from_angles
 
 HEAD = "G21 G90\n"
-START = HEAD + "G0 X0 Y0 Z0\n"
+START = HEAD + "G0 X0. Y0. Z0.\n"
 
 
 def read(tmp_path: Path, text: str, **options: object) -> ToolPath:
@@ -104,7 +105,7 @@ def test_inches_wherever_the_word_stands(tmp_path: Path) -> None:
 
 
 def test_missing_unit_and_end_are_findings(tmp_path: Path) -> None:
-    assert codes(read(tmp_path, "G1 X1 Y0 Z0 F1\nX2")) == {301, 316}
+    assert codes(read(tmp_path, "G1 X1. Y0 Z0 F1\nX2")) == {301, 316}
     assert codes(read(tmp_path, START + "X1\nM30\n%\n\nX9\n")) == {312}
 
 
@@ -171,25 +172,27 @@ def test_rotary_angles_need_a_convention(tmp_path: Path, rotary: str, words: str
 
 def test_events_of_the_machine(tmp_path: Path) -> None:
     text = (
-        START + 'T5\nM6\nS900\nM4\nM8\nG4 P1.5\nG4 P250\nG4 X2\nG54\nG64\nM428\nM0\nM9\nMSG("hi")\nG1 X1 F9\nS800\nM30'
+        "G54\n"
+        + START
+        + 'T5\nM6\nS900\nM4\nM8\nG4 P1.5\nG4 P250\nG4 X2\nG54\nG64\nM428\nM0\nM9\nMSG("hi")\nG1 X1 F9\nS800\nM30'
     )
     path = read(tmp_path, text)
     assert [(e.kind, e.value) for e in path.events] == [
-        (EventKind.OTHER, 0), (EventKind.TOOL, 5), (EventKind.OTHER, 0), (EventKind.SPINDLE, -900),
-        (EventKind.COOLANT, 1), (EventKind.DWELL, 1.5), (EventKind.DWELL, 0.25), (EventKind.DWELL, 2),
-        (EventKind.OTHER, 0), (EventKind.OTHER, 0), (EventKind.OTHER, 0), (EventKind.STOP, 0), (EventKind.COOLANT, 0),
-        (EventKind.COMMENT, 0), (EventKind.SPINDLE, -800),
+        (EventKind.OTHER, 0), (EventKind.OTHER, 0), (EventKind.TOOL, 5), (EventKind.OTHER, 0),
+        (EventKind.SPINDLE, -900), (EventKind.COOLANT, 1), (EventKind.DWELL, 1.5), (EventKind.DWELL, 0.25),
+        (EventKind.DWELL, 2), (EventKind.OTHER, 0), (EventKind.OTHER, 0), (EventKind.OTHER, 0),
+        (EventKind.STOP, 0), (EventKind.COOLANT, 0), (EventKind.COMMENT, 0), (EventKind.SPINDLE, -800),
     ]  # fmt: skip
-    assert [e.text for e in path.events if e.kind is EventKind.OTHER] == ["T5", "S900", "G54", "G64", "M428"]
+    assert [e.text for e in path.events if e.kind is EventKind.OTHER] == ["G54", "T5", "S900", "G54", "G64", "M428"]
     assert codes(path) == {314}
 
 
 def test_moves_before_the_position_is_known_are_not_in_the_path(tmp_path: Path) -> None:
-    text = HEAD + "G0 X5 Y5\nG43 H1 Z50\nG1 Z0 F100\nG0 Z50\nG91 G28 Z0\nG90 G0 X9 Y9\nZ50\nM2"
+    text = HEAD + "G0 X5. Y5\nG43 H1 Z50\nG1 Z0 F100\nG0 Z50\nG91 G28 Z0\nG90 G0 X9 Y9\nZ50\nM2"
     path = read(tmp_path, text)
     assert path.tips_mm.tolist() == [[5, 5, 50], [5, 5, 0], [5, 5, 50], [9, 9, 50]]
     assert codes(path) == {310, 318}
-    assert [e.text for e in path.events] == ["G0 X5 Y5", "G43 H1", "G28 Z0", "G0 X9 Y9"]
+    assert [e.text for e in path.events] == ["G0 X5. Y5", "G43 H1", "G28 Z0", "G0 X9 Y9"]
 
 
 def test_block_numbers_may_wrap_but_not_restart(tmp_path: Path) -> None:
@@ -404,13 +407,20 @@ def test_repeated_points_and_long_axes_are_findings(tmp_path: Path) -> None:
 
 
 def test_recover_drops_what_is_cut_and_guesses_nothing(tmp_path: Path) -> None:
-    cut = START + "G1 X1 F9\nX2 Y"
-    refused(tmp_path, cut, 4, "Y word without a number", "--recover")
+    cut = START + "G1 X1 F9\nX2\nM3 S"
+    refused(tmp_path, cut, 5, "S word without a number", "--recover")
     path = read(tmp_path, cut, recover=True)
-    assert path.tips_mm[-1].tolist() == [1, 0, 0]
-    assert [(f.code, f.where[-6:]) for f in path.findings] == [(350, "line 4")]
-    # a whole number may have been a longer one
-    assert read(tmp_path, START + "G1 X1 F9\nX25", recover=True).tips_mm[-1].tolist() == [1, 0, 0]
+    assert path.tips_mm[-1].tolist() == [2, 0, 0]
+    assert [(f.code, f.where[-6:]) for f in path.findings] == [(350, "line 5")]
+    for recover in (False, True):  # what moves is never dropped
+        with pytest.raises(FormatError, match=r"line 4: Y word without a number.*export it again") as caught:
+            read(tmp_path, START + "G1 X1 F9\nX2 Y", recover=recover)
+        assert "--recover" not in str(caught.value)
+        # a whole number may have been a longer one
+        path = read(tmp_path, START + "G1 X1 F9\nX25", recover=recover)
+        assert path.tips_mm[-1].tolist() == [25, 0, 0]
+        assert [(f.code, f.level) for f in path.findings] == [(316, Level.WARN)]
+        assert "whose line has no end" in path.findings[0].message
     assert codes(read(tmp_path, START + "G1 X1 F9\nM30", recover=True)) == set()
     joined = START + "N20 G1 X1 F9\nN10 X2\nM2\n"
     path = read(tmp_path, joined, recover=True)

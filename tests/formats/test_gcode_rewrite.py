@@ -186,11 +186,11 @@ def test_axes_are_written_only_where_the_program_has_words_for_them(tmp_path: Pa
     new = np.array(fanuc.axes)
     new[2] = [0.0, 0.6, 0.8]
     assert lines(rewrite(fanuc, replace(fanuc, axes=new)))[3:6] == [
-        "G1 X5 I.6 K.8 F9", "X6 I0 J0.6 K0.8", "X7 I0 J0 K1",
+        "G1 X5 I.6 K.8 F9", "X6 I0. J0.6 K0.8", "X7 I0 J0 K1",
     ]  # fmt: skip
     new = np.array(fanuc.axes)
     new[1] = [0.6, 0.48, 0.64]
-    assert lines(rewrite(fanuc, replace(fanuc, axes=new)))[3:5] == ["G1 X5 J0.48 I.6 K.64 F9", "X6 I.6 J0 K.8"]
+    assert lines(rewrite(fanuc, replace(fanuc, axes=new)))[3:5] == ["G1 X5 J0.48 I.6 K.64 F9", "X6 I.6 J0. K.8"]
 
 
 def test_rotary_angles_stay_on_their_branch(tmp_path: Path) -> None:

@@ -57,6 +57,39 @@ def test_seed_is_a_triangle_of_30_40_50_mm(unit, in_process):
         read_part(CORPUS / f"trimmed_{unit}.igs", units=other)
 
 
+@pytest.mark.parametrize(("flag", "says"), [(2, "mm"), (9, "um"), (6, "m")])
+def test_flag_and_name_that_contradict_each_other_are_refused(flag, says, plates, tmp_path, in_process):
+    path = restated(plates, tmp_path, f"1.,{flag},4HINCH")
+    with pytest.raises(UnitError, match=rf"the unit flag {flag} says {says}, the unit name says inch; .*--cad-units"):
+        read_part(path)
+    with pytest.raises(UnitError, match="says inch"):
+        read_part(path, units="cm")
+
+
+@pytest.mark.parametrize("unit", ["mm", "inch"])
+def test_user_decides_between_flag_and_name(unit, plates, tmp_path, in_process):
+    part = read_part(restated(plates, tmp_path, "1.,2,4HINCH"), units=unit)
+    scale = 1.0 if unit == "inch" else 1 / 25.4
+    assert part.contours[0].length_mm == pytest.approx(320.0 * scale)
+    assert (part.source.unit, part.source.unit_stated) == (unit, True)
+
+
+def test_unit_that_cannot_be_read_is_asked_for(plates, tmp_path, in_process):
+    path = restated(plates, tmp_path, "1.,3,4HELLE")
+    with pytest.raises(UnitError, match="the unit of length cannot be read; state it with --cad-units"):
+        read_part(path)
+    assert read_part(path, units="inch").contours[0].length_mm == pytest.approx(320.0)
+
+
+def restated(plates: Path, folder: Path, unit: str) -> Path:
+    """Return the plate in inch with another unit in its global section."""
+    text = (plates / "IN0.igs").read_text()
+    assert "1.,1,4HINCH" in text
+    path = folder / "restated.igs"
+    path.write_text(text.replace("1.,1,4HINCH", unit))
+    return path
+
+
 def altered(folder: Path, change) -> Path:
     lines = (CORPUS / "trimmed_mm.igs").read_bytes().splitlines()
     path = folder / "altered.igs"

@@ -126,8 +126,8 @@ def test_compensation_can_be_ignored(tmp_path: Path) -> None:
         (MOVES + "4\n-1.\n", 6, ["dwell"]),
         (MOVES + "hello\n1\n", 5, ["no NCI code"]),
         ("G0 X1 Y2\nG1 X2\n", 1, ["no NCI code"]),
-        (MOVES + "1\n", 6, ["--recover"]),
-        (MOVES + "1\n0 3. 4.", 6, ["--recover"]),
+        (MOVES + "4\n", 6, ["--recover"]),
+        (MOVES + "1002\n0 1. 4.", 6, ["--recover"]),
     ],
 )
 def test_bad_records_name_their_line(tmp_path: Path, text: str, line: int, words: list[str]) -> None:
@@ -135,11 +135,33 @@ def test_bad_records_name_their_line(tmp_path: Path, text: str, line: int, words
 
 
 def test_a_cut_file_can_be_read_without_its_last_record(tmp_path: Path) -> None:
-    for cut in ("1\n", "1\n0 3. 4.", "1"):
+    for cut in ("4\n", "1002\n0 3. 4.", "1001", "1014\n1. 0."):
+        with pytest.raises(FormatError, match="--recover"):
+            read(tmp_path, MOVES + cut)
         path = read(tmp_path, MOVES + cut, recover=True, units="mm")
         assert len(path) == 2
         assert codes(path) == {316, 350}
     refused(tmp_path, MOVES + "1\n0 3. 4.\n1003\n0\n", 6, "5 numbers", recover=True)
+
+
+@pytest.mark.parametrize(
+    "cut", ["1\n", "1", "1\n0 3. 4.", "0\n0 3.", "2\n0 0 1.", "11\n1. 2. 3. 4.", "12\n", "81\n0 1."]
+)
+def test_a_cut_motion_is_never_left_out(tmp_path: Path, cut: str) -> None:
+    for recover in (False, True):
+        with pytest.raises(FormatError) as caught:
+            read(tmp_path, MOVES + cut, recover=recover)
+        assert caught.value.line in (5, 6)
+        assert "--recover" not in str(caught.value)
+
+
+def test_a_file_without_end_that_ends_in_a_cut_is_a_warning(tmp_path: Path) -> None:
+    for rest, level in (
+        ("", Level.WARN), ("0\n0 1. 0. 9. -2. 0\n", Level.INFO), ("1\n0 1. 0. 9. -1. 0\n", Level.INFO),
+        ("0\n0 1. 0. 9. -2. 0", Level.WARN),
+    ):  # fmt: skip
+        (found,) = [f for f in read(tmp_path, MOVES + rest).findings if f.code == 316]
+        assert found.level is level
 
 
 def test_binary_and_packed_files_say_what_they_are(tmp_path: Path) -> None:

@@ -85,6 +85,13 @@ def test_units(tmp_path: Path) -> None:
         read_scan(path, units="foot")
 
 
+@pytest.mark.parametrize("recover", [False, True])
+def test_too_many_declared_vertices_are_named(tmp_path: Path, recover: bool) -> None:
+    path = write(tmp_path, MESH.replace("4 2 0", "5 2 0"))
+    with pytest.raises(FormatError, match=r"line 7: .*declares too many vertices \(5\)"):
+        read_scan(path, recover=recover)
+
+
 @pytest.mark.parametrize(
     ("content", "place", "words"),
     [
@@ -239,3 +246,19 @@ def test_damaged_bytes_are_data_or_a_format_error(
             assert "damaged.off" in str(error) and "\n" not in str(error)
         else:
             assert np.isfinite(scan.points_mm).all()
+
+
+@pytest.mark.parametrize(("face", "line"), [(b"3 0 1 2.0", 20_020), (b"3 0 1", 20_020), (b"3 0 1 9", 20_020)])
+def test_many_faces_are_read_at_once_and_refused_one_by_one(tmp_path: Path, face: bytes, line: int) -> None:
+    square = b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+    rows = [b"3 0 1 2", b"3 2 3 0"] * 10_010
+    path = tmp_path / "mesh.off"
+    path.write_bytes(b"OFF\n4 %d 0\n%s" % (len(rows), square) + b"\n".join(rows) + b"\n")
+    scan = read_scan(path)
+    assert scan.faces is not None and scan.faces[:3].tolist() == [[0, 1, 2], [2, 3, 0], [0, 1, 2]]
+    assert len(scan.faces) == len(rows)
+    rows[line - 7] = face
+    path.write_bytes(b"OFF\n4 %d 0\n%s" % (len(rows), square) + b"\n".join(rows) + b"\n")
+    with pytest.raises(FormatError) as caught:
+        read_scan(path)
+    assert caught.value.line == line

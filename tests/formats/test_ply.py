@@ -12,7 +12,8 @@ import pytest
 from sicp_cam.errors import FormatError, UnitError
 from sicp_cam.findings import Level
 from sicp_cam.limits import Limits
-from sicp_formats.ply import read_scan, write_scan
+from sicp_cam.model import Part, TriangleMesh
+from sicp_formats.ply import read_scan, write_part, write_scan
 
 POINTS = np.array([[0.0, 0.0, 0.0], [10.5, 0.25, -3.0], [0.0, 20.0, 1.5], [10.0, 20.0, 2.0]])
 XYZ = "property float x\nproperty float y\nproperty float z\n"
@@ -311,6 +312,18 @@ def test_damaged_files_are_refused_with_their_place(
 
 def test_a_mesh_without_area_is_refused(tmp_path: Path) -> None:
     refused(write(tmp_path, ascii_ply(text_rows() + "3 1 1 2\n", more=FACES)), "area")
+
+
+@pytest.mark.parametrize("recover", [False, True])
+@pytest.mark.parametrize(
+    ("declared", "words"), [(3, "48 more bytes than the header declares"), (5, "a count of the header")]
+)
+def test_a_wrong_count_of_vertices_is_blamed(tmp_path: Path, declared: int, words: str, recover: bool) -> None:
+    content = write_part(Part((), TriangleMesh(POINTS, np.array([[0, 1, 2], [1, 3, 2]]))))
+    assert b"element vertex 4\n" in content
+    path = write(tmp_path, content.replace(b"element vertex 4\n", b"element vertex %d\n" % declared))
+    with pytest.raises(FormatError, match=rf"none of the 2 faces has 3 corners.*{words}"):
+        read_scan(path, recover=recover)
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:

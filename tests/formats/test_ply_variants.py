@@ -269,7 +269,7 @@ class TestPart:
 
     @pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
     def test_written_and_read_is_the_same(self, tmp_path: Path, encoding: str) -> None:
-        part = read_part(CORPUS / "tristrips.ply")
+        part = read_part(CORPUS / "tristrips.ply", units="mm")
         again = read_part(write(tmp_path, write_part(part, encoding=encoding)))  # type: ignore[arg-type]
         assert np.array_equal(again.mesh.vertices_mm, part.mesh.vertices_mm)
         assert np.array_equal(again.mesh.faces, part.mesh.faces)
@@ -377,3 +377,15 @@ class TestManyRowsOfText:
 def test_levels_of_repairs_end_a_strict_run(tmp_path: Path) -> None:
     scan = read_scan(write(tmp_path, text(NAN_ROWS, vertices=6)), recover=True)
     assert {each.level for each in scan.findings} == {Level.WARN}
+
+
+def test_rows_that_are_missing_before_others_are_not_made_of_those(tmp_path: Path) -> None:
+    head = b"ply\nformat binary_little_endian 1.0\nelement vertex 8\n"
+    head += b"property float x\nproperty float y\nproperty float z\n"
+    head += b"element face 3\nproperty list uchar int vertex_indices\nend_header\n"
+    faces = np.zeros(3, [("count", "u1"), ("corners", "<i4", (3,))])
+    faces["count"], faces["corners"] = 3, [[0, 1, 2], [1, 2, 3], [0, 2, 3]]
+    file = tmp_path / "scan.ply"
+    file.write_bytes(head + np.asarray(POINTS[:4], "<f4").tobytes() + faces.tobytes())
+    with pytest.raises(FormatError, match="element vertex declares 8"):
+        read_scan(file, recover=True)

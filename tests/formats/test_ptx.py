@@ -68,6 +68,24 @@ def test_a_unit_that_is_stated_is_followed(tmp_path: Path) -> None:
         read_scan(write(tmp_path, PLAIN), units="furlong")
 
 
+@pytest.mark.parametrize("scale", [1.0004, 0.9998, 1.00001])
+def test_a_scale_in_the_matrix_is_taken_out_and_told(tmp_path: Path, scale: float) -> None:
+    path = write(tmp_path, scan_text(axes=scale * TURN))
+    scan = read_scan(path, units="mm")
+    assert np.allclose(scan.points_mm[0], [10.0, 21.0, 1.75], rtol=0, atol=1e-12)
+    told = [each for each in scan.findings if each.code == 156]
+    assert len(told) == 1 and told[0].level is Level.WARN and told[0].where.endswith("line 7")
+    with pytest.raises(FormatError, match=r"line 7: .*no rigid motion"):
+        read_scan(write(tmp_path, scan_text(axes=1.0006 * TURN)))
+
+
+def test_rounded_matrices_are_taken_as_they_are(tmp_path: Path) -> None:
+    angle = np.radians(30)
+    turned = np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    scan = read_scan(write(tmp_path, scan_text(axes=turned.round(6))), units="mm")
+    assert 156 not in codes(scan) and np.allclose(scan.points_mm[0], HERE + POINTS[0] @ turned, atol=1e-5)
+
+
 def test_several_scans_share_one_frame(tmp_path: Path) -> None:
     world = HERE + POINTS[[0, 2, 3]] @ TURN
     local = np.vstack([world - (5.0, 5.0, 5.0), np.zeros(3)])

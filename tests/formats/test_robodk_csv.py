@@ -99,7 +99,14 @@ def test_names_by_option_replace_a_header(tmp_path: Path) -> None:
         ("x [um],y [um],z [um]\n1,2,3\n", {}, 1, "'um' of x, y, z is not known"),
         ("x,y,z,feed [rpm]\n1,2,3,4\n", {}, 1, "'rpm' of the feed"),
         ("1,2,3,4,5,6,7,8\n", {}, 1, "path.columns="),
-        ("1,2,3\n4,5,6\n7,8\n", {}, 3, "repair it with --recover"),
+        ("1,2,3,4,5,6,7\n", {}, 1, "x,y,z,w,p,r,- with --set path.euler=xyz or zyx"),
+        ("1,2,3,40,5,6\n", {}, 1, "x,y,z,rx,ry,rz with path.euler=xyz or zyx"),
+        ("x,y,z,i,j,k\n1,2,3,0,0,1\n1,2,3,0,45,90\n", {}, 3, "length 100.6"),
+        ("x,y,z,i,j,k\n1,2,3,0,0,0.4\n", {}, 2, "path.euler="),
+        ("1,2,3,0,0,2.1\n", {"columns": "x,y,z,nx,ny,nz"}, 1, "length 2.1"),
+        ("x,y,z,a,b,c\n1,2,3,0,0,180\n", {"euler": "xyz"}, 1, "no orientation is read from angles"),
+        ("x,y,z,i,j,k\n1,2,3,0,0,1\n", {"euler": "zyx"}, 1, "leave the option out"),
+        ("1,2,3\n4,5,6\n", {"euler": "zyx"}, 1, "leave the option out"),
         ("1,2,3\n4,5\n7,8,9\n", {"recover": True}, 2, "2 cells where 3"),
         ("1,2\n4,5\n", {"columns": "x,y,z"}, 1, "2 cells where 3"),
     ],
@@ -119,12 +126,27 @@ def test_bad_options_are_job_errors(tmp_path: Path) -> None:
             read(tmp_path, "1,2,3\n4,5,6\n", **wrong)
 
 
-def test_only_a_last_row_that_is_cut_short_is_dropped(tmp_path: Path) -> None:
-    path = read(tmp_path, "1,2,3\n4,5,6\n7,8", recover=True)
-    assert len(path) == 2
-    (finding,) = [finding for finding in path.findings if finding.code == 365]
-    assert finding.level is Level.WARN
-    assert finding.where.endswith("line 3")
+def test_a_last_row_that_is_cut_short_is_never_dropped(tmp_path: Path) -> None:
+    for recover in (False, True):
+        for cut in ("7,8", "7,8,", "7"):
+            with pytest.raises(FormatError) as caught:
+                read(tmp_path, f"1,2,3\n4,5,6\n{cut}", recover=recover)
+            assert caught.value.line == 3
+            assert "--recover" not in str(caught.value)
+
+
+def test_a_b_c_are_angles_about_z_y_and_x_where_that_is_said(tmp_path: Path) -> None:
+    path = read(tmp_path, "x,y,z,a,b,c\n1,2,3,90,0,-90\n4,5,6,0,30,180\n", euler="zyx")
+    expected = -Rotation.from_euler("ZYX", [[90, 0, -90], [0, 30, 180]], degrees=True).as_matrix()[:, :, 2]
+    assert np.allclose(path.axes, expected, atol=1e-12)
+    assert not codes(path) & {303, 315}
+    assert {303, 315} <= codes(read(tmp_path, "x,y,z,a,b,c\n1,2,3,90,0,-90\n4,5,6,0,30,180\n"))
+
+
+def test_axes_near_to_length_1_are_scaled_with_a_warning(tmp_path: Path) -> None:
+    path = read(tmp_path, "x,y,z,i,j,k\n1,2,3,0,0,2\n4,5,6,0,0.5,0\n")
+    assert path.axes.tolist() == [[0, 0, 1], [0, 1, 0]]
+    assert 304 in codes(path)
 
 
 # --- written again ---
@@ -148,6 +170,36 @@ def test_only_what_changes_is_written(tmp_path: Path) -> None:
     assert written[:2] == lines[:2]
     assert written[2] == lines[2].replace("4.5000", "4.7500")
     assert written[3] == lines[3].replace("0.0000000,0.0000000,1.0000000", "0.6000000,0.0000000,0.8000000")
+
+
+def test_whole_numbers_between_commas_get_decimal_points(tmp_path: Path) -> None:
+    text = (
+        "x,y,z,i,j,k,feed,rapid,note\n131,-0,40,0,0,1,0,1,safe height\n10 ,0,0,0,0,1,9,0,a 5\n# c\n1, 0 ,0,0,0,1,9,0,\n"
+    )
+    path = read(tmp_path, text)
+    shift = np.array([-6.939, -6.2556, 0.5])
+    written = moved(path, path.tips_mm + shift)
+    assert not [finding for finding in written.findings if finding.level is Level.FAIL]
+    assert written.content.decode().splitlines()[1] == "124.0610,-6.2556,40.5000,0,0,1,0,1,safe height"
+    assert np.abs(read(tmp_path, written.content).tips_mm - path.tips_mm - shift).max() < 1e-4
+
+
+def test_whole_numbers_between_semicolons_get_the_mark_of_the_table(tmp_path: Path) -> None:
+    for feed, tip in (("9,5", "1,2500;2;3;9,5"), ("9.5", "1.2500;2;3;9.5"), ("9", "1.2500;2;3;9")):
+        path = read(tmp_path, f"x;y;z;feed\n1;2;3;{feed}\n4;5;6;{feed}\n")
+        tips = path.tips_mm.copy()
+        tips[0, 0] += 0.25
+        assert moved(path, tips).content.decode().splitlines()[1] == tip
+
+
+def test_what_does_not_read_back_is_not_given_out(tmp_path: Path) -> None:
+    path = read(tmp_path, '"1,5",2,3\n4,5,6\n')
+    written = moved(path, path.tips_mm + np.array([0, 0.25, 0]))  # 2,25 without quotes would be two cells
+    assert written.content == b""
+    (finding,) = [f for f in written.findings if f.level is Level.FAIL]
+    assert finding.code == 322 and "cannot be written again" in finding.message
+    far = moved(path, path.tips_mm + np.array([0, 0, 1e9]))
+    assert far.content == b"" and {f.code for f in far.findings} == {322}
 
 
 def test_added_rows_copy_the_other_cells_and_the_decimal_comma() -> None:

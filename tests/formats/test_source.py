@@ -24,12 +24,12 @@ def test_a_gzip_file_is_unpacked_and_its_own_hash_recorded(tmp_path):
 
 
 def test_several_members_and_padding_are_read_as_one(tmp_path):
-    content = gzip.compress(TEXT) + gzip.compress(b"7 8 9\n") + b"\0" * 16
+    content = gzip.compress(TEXT, mtime=0) + gzip.compress(b"7 8 9\n") + b"\0" * 16
     assert read_bytes(packed(tmp_path, content), Limits()) == TEXT + b"7 8 9\n"
 
 
 def test_a_library_gets_a_plain_file(tmp_path):
-    file = packed(tmp_path, gzip.compress(TEXT), "part.step.gz")
+    file = packed(tmp_path, gzip.compress(TEXT, mtime=0), "part.step.gz")
     with plain_file(file, TEXT) as plain:
         assert (plain.name, plain.read_bytes()) == ("part.step", TEXT)
     assert not plain.exists()
@@ -40,13 +40,13 @@ def test_a_library_gets_a_plain_file(tmp_path):
 @pytest.mark.parametrize(
     ("content", "name", "what"),
     [
-        (gzip.compress(TEXT)[:-12], "a.ply.gz", "ends in the middle"),
-        (gzip.compress(TEXT)[:12] + b"\xff" * 30, "a.ply.gz", "gzip"),
+        (gzip.compress(TEXT, mtime=0)[:-12], "a.ply.gz", "ends in the middle"),
+        (gzip.compress(TEXT, mtime=0)[:12] + b"\xff" * 30, "a.ply.gz", "gzip"),
         (TEXT, "a.ply.gz", "is no gzip file"),
-        (gzip.compress(TEXT) + b"rest", "a.ply.gz", "is no gzip file"),
-        (gzip.compress(b""), "a.ply.gz", "has nothing in it"),
-        (gzip.compress(TEXT), "a.ply", "is a gzip archive; name it .gz"),
-        (gzip.compress(gzip.compress(TEXT)), "a.ply.gz", "is a gzip archive"),
+        (gzip.compress(TEXT, mtime=0) + b"rest", "a.ply.gz", "is no gzip file"),
+        (gzip.compress(b"", mtime=0), "a.ply.gz", "has nothing in it"),
+        (gzip.compress(TEXT, mtime=0), "a.ply", "is a gzip archive; name it .gz"),
+        (gzip.compress(gzip.compress(TEXT, mtime=0), mtime=0), "a.ply.gz", "is a gzip archive"),
     ],
 )
 def test_what_is_wrong_with_an_archive_is_said(tmp_path, content, name, what):

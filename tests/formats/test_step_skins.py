@@ -110,9 +110,13 @@ def assert_outline_and_hole(part):
 def test_loose_patches_are_one_skin(patches, tmp_path, in_process):
     part = read_part(write(together(*patches), tmp_path / "loose.step"))
     assert_outline_and_hole(part)
-    assert codes(part) == [210, 212]
+    assert codes(part) == [210, 212, 217]
     assert said(part, 212).level is Level.INFO
     assert "4 seams" in said(part, 212).message
+    assert said(part, 217).level is Level.WARN
+    assert said(part, 217).message.startswith("4 products of one face each, which have no names of their own")
+    assert "part.sew_mm=0" in said(part, 217).message
+    assert codes(read_part(write(together(*patches), tmp_path / "one.step", products=False))) == [210, 212]
 
 
 def test_patches_of_one_shell_are_one_skin_without_sewing(patches, tmp_path, in_process):
@@ -213,7 +217,7 @@ def test_touching_skins_of_two_products_stay_apart(patches, tmp_path, in_process
     halves = together(together(*patches[:2]), together(*patches[2:]))
     assert_outline_and_hole(read_part(write(halves, tmp_path / "one.step", products=False)))
     text = write(halves, tmp_path / "two.step").read_text()
-    names = iter(["panel", "left", "a", "b", "right", "c", "d"])
+    names = iter(["panel", "left", "", "", "right", "Face 1", "Face 2"])
     text = re.sub(r"= PRODUCT\('[^']*',\s*'[^']*'", lambda match: f"= PRODUCT('{(name := next(names))}','{name}'", text)
     (tmp_path / "two.step").write_text(text)
     part = read_part(tmp_path / "two.step")
@@ -221,6 +225,7 @@ def test_touching_skins_of_two_products_stay_apart(patches, tmp_path, in_process
     assert part.contours[0].length_mm == pytest.approx(part.contours[1].length_mm, rel=1e-3)
     assert said(part, 212).message.startswith("2 seams")
     assert re.search(r"2 bodies, .* 1 'left' \(\d\), 2 'right' \(\d\)", said(part, 211).message)
+    assert [f.message[:10] for f in part.findings if f.code == 217] == ["2 products"] * 2
 
 
 @pytest.mark.parametrize(

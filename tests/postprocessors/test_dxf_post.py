@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from post_programs import nasty_program, path_of, program_of, simple_program, straight_program
 
+from sicp_cam import plugins
 from sicp_cam.errors import JobError, PathError
 from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind, Program, Status
@@ -189,3 +190,8 @@ def test_one_move_is_a_drawing_and_none_is_refused():
     empty = path_of(np.zeros((0, 3)), np.zeros((0, 3)))
     with pytest.raises(PathError, match="no moves"):
         Dxf().write(Program("x", empty, ()))
+
+
+def test_a_target_named_dxf_finds_it() -> None:
+    assert Dxf.suffix == ".dxf"
+    assert "dxf" in plugins.posts_writing(Path("path.dxf"))

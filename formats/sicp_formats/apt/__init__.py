@@ -46,7 +46,7 @@ def read_path(
         Caps on the file and the path.
     recover
         Repair what moves nothing: leave out a last statement that is cut short and NUL bytes after the end, and keep
-        damaged FEDRAT and DELAY statements as text. A damaged motion in the middle stays an error.
+        damaged FEDRAT and DELAY statements as text. A damaged motion stays an error, wherever it stands.
     feed_mm_min
         Feed for cutting moves that the file gives none.
     chord_mm, step_mm

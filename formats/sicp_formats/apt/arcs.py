@@ -260,15 +260,11 @@ class ArcReader:
         self._votes.compare(last[1].end_direction, minus(tip, start), line)
         return False
 
-    def finish(self) -> None:
-        """Refuse an arc without end, and arcs whose sense is in doubt unless the user stated it."""
+    def finish(self, *, trusted: bool = False) -> None:
+        """Refuse an arc without end, and arcs whose sense is in doubt unless it was stated, or is trusted."""
         self._refuse_waiting()
-        if self._sense == "auto":
+        if self._sense == "auto" and not trusted:
             self._votes.check(self._moves)
-
-    def forget(self) -> None:
-        """Let go of an arc that waits for its end."""
-        self._circle, self._last, self.idle = None, None, True
 
     def _refuse_waiting(self) -> None:
         if self._circle is not None:

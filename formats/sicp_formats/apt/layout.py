@@ -12,7 +12,7 @@ from sicp_formats.paths.number_tokens import NUMBER_TOKEN, retold
 
 __all__ = ["Layout", "Precision", "comments_of"]
 
-_LABEL = re.compile(r"^(\s*)[A-Za-z0-9]+\)\s*", re.ASCII)
+_LABEL = re.compile(r"^(\s*)(?:[A-Za-z0-9]+\)\s*|[Nn][0-9]+\s*(?=[A-Za-z]))", re.ASCII)
 _BLANKS = re.compile(r" *\Z")
 _AXIS_TOKENS = ("0.0000000",) * 3
 _LONGEST_LINE = 72
@@ -69,8 +69,12 @@ class Layout:
         )
 
     def bare_lead(self) -> str:
-        """Return what stands before the numbers, without the label of the statement."""
+        """Return what stands before the numbers, without the label or number of the statement."""
         return _LABEL.sub(r"\1", self.lead)
+
+    def without_comments(self) -> Layout:
+        """Return the layout on one line if there are remarks between its numbers, which are to be said once only."""
+        return replace(self, gaps=tuple("," if "$" in gap else gap for gap in self.gaps))
 
     def with_axis(self, sample: Layout | None, line_end: str) -> Layout:
         """Return the layout with room for an axis behind its three numbers, as in the sample if there is one."""

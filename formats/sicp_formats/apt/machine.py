@@ -34,6 +34,7 @@ class Machine:
     _per_revolution: bool = False
     _speed: float = 0.0
     _running: float = 0.0
+    _unknown_since: int | None = None
 
     def feedrate(self, line: int, arguments: str) -> None:
         """FEDRAT/v, FEDRAT/v,MMPM or FEDRAT/MMPM,v: the feed of the cutting moves that follow."""
@@ -116,3 +117,11 @@ class Machine:
         length_mm = self.moves.mm if self._feed_length_mm is None else self._feed_length_mm
         turns = abs(self._running) if self._per_revolution else 1.0
         self.feed_mm_min = self._feed * length_mm * turns
+        self.finish()
+        self._unknown_since = len(self.moves) if self._feed and not self.feed_mm_min else None
+
+    def finish(self) -> None:
+        """Count the cuts so far whose feed per revolution is of no use, because the speed was not known."""
+        if self._unknown_since is not None:
+            self.moves.per_turn += self.moves.cuts_since(self._unknown_since)
+            self._unknown_since = None

@@ -13,8 +13,8 @@ from sicp_formats.apt.arguments import NUMBER, split_arguments
 from sicp_formats.apt.frames import Frames
 from sicp_formats.apt.machine import Machine
 from sicp_formats.apt.options import AptOptions
-from sicp_formats.apt.refusals import HARMLESS, reason_to_refuse, switches_on
-from sicp_formats.apt.statements import COMMENT, TEXT_WORDS, statements_of
+from sicp_formats.apt.refusals import HARMLESS, MOVES_NOTHING, reason_to_refuse, switches_on
+from sicp_formats.apt.statements import COMMENT, TEXT_WORDS, last_line, statements_of, word_of
 from sicp_formats.paths.arcs import Vector, minus, norm
 from sicp_formats.paths.findings import Notice
 from sicp_formats.paths.moves import MoveList
@@ -34,10 +34,20 @@ _UNITS = {
 }
 _KEEPS_ITS_PLACE_MM = 1e-4
 _ENDS = ("FINI", "END")
+_A_POINT = 3  # numbers from which a statement may hold coordinates
 
 
-def execute(path: Path, content: bytes, options: AptOptions) -> AptReader:
+def execute(path: Path, content: bytes, options: AptOptions, *, trusted: bool = False) -> AptReader:
     """Return the reader that has executed a program to its end; its `moves` are not judged as a whole yet.
+
+    Parameters
+    ----------
+    path, content
+        The file and its bytes.
+    options
+        How to read it.
+    trusted
+        True if the sense of arcs was settled before, and needs no second look.
 
     Raises
     ------
@@ -47,7 +57,7 @@ def execute(path: Path, content: bytes, options: AptOptions) -> AptReader:
         If the unit of `options` is unknown or contradicts the file.
     """
     moves = MoveList(path, options.limits, options.units, options.chord_mm, options.step_mm)
-    reader = AptReader(moves, options)
+    reader = AptReader(moves, options, trusted=trusted)
     text = content.rstrip(b"\0")
     padding = len(content) - len(text)
     if padding > 1 and b"\0" not in text:  # UTF-16 text has NUL bytes everywhere
@@ -63,12 +73,14 @@ def execute(path: Path, content: bytes, options: AptOptions) -> AptReader:
 class AptReader:
     """Executes the statements of one file in order."""
 
-    def __init__(self, moves: MoveList, options: AptOptions) -> None:
+    def __init__(self, moves: MoveList, options: AptOptions, *, trusted: bool = False) -> None:
         self.moves = moves
         self.name = ""
         self.states_axes = False
+        self.numbers_kept: list[str] = []
         self.arcs = arcs = ArcReader(moves, options.arc_sense, options.arc_points)
         self._options = options
+        self._trusted = trusted
         self._machine = machine = Machine(moves)
         self._frames = frames = Frames(moves, options.frame)
         self._axis: Vector = (0.0, 0.0, 1.0)
@@ -110,7 +122,7 @@ class AptReader:
             except FormatError as error:
                 if any(text.strip() for _, text in numbered):
                     raise
-                self._drop_last(error)
+                self._drop_last(error, line)
                 break
             if ended:
                 break
@@ -149,25 +161,24 @@ class AptReader:
         self.moves.event(EventKind.OTHER, line, 0.0, f"{word}/{arguments.strip()}")
         self.moves.note(Notice.STATEMENT_AS_TEXT, line, printable(f"{word}/{arguments.strip()}", 40))
 
-    def _drop_last(self, error: FormatError) -> None:
-        """Leave out the last statement of a file that ends without FINI, where the user wants repairs."""
+    def _drop_last(self, error: FormatError, text: str) -> None:
+        """Leave out the last statement of a file that ends without FINI, if it moves nothing and repairs are wanted."""
+        if word_of(text) not in MOVES_NOTHING:
+            raise error
         if not self._options.recover:
-            what = f"{error.what}; if the file was cut here, repair it with --recover"
+            offered = "--recover" in error.what
+            what = error.what if offered else f"{error.what}; if the file was cut here, repair it with --recover"
             raise FormatError(error.path, what, line=error.line) from None
-        self.arcs.forget()
         self.moves.note(Notice.LAST_STATEMENT_DROPPED, error.line or 0)
 
     def _finish(self, lines: list[str]) -> None:
         self._frames.finish(len(lines))
-        try:
-            self.arcs.finish()
-        except FormatError as error:
-            if self._ended or not self.arcs.circle_waits:
-                raise
-            self._drop_last(error)
-            self.arcs.finish()
+        self.arcs.finish(trusted=self._trusted)
+        self._machine.finish()
         if not self._ended:
-            self.moves.note(Notice.END_MISSING, len(lines))
+            moved = int(self.moves.rows[-1]) if len(self.moves) else 0
+            torn = moved > 0 and bool(lines[-1].strip()) and last_line(lines, moved) == len(lines)
+            self.moves.note_missing_end(len(lines), torn=torn)
 
     # --- motion ---
 
@@ -314,6 +325,8 @@ class AptReader:
             self.name = self.name or arguments.split(",")[0].strip()
         if word not in HARMLESS:
             self.moves.note(Notice.WORD_UNKNOWN, line, printable(word, 40))
+            if len(split_arguments(arguments)[0]) >= _A_POINT:
+                self.numbers_kept.append(printable(f"{word} (line {line})", 60))
 
 
 def _floats(text: str) -> list[float]:

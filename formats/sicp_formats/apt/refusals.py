@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from sicp_formats.apt.arguments import split_arguments
+from sicp_formats.apt.statements import TEXT_WORDS
 
-__all__ = ["HARMLESS", "reason_to_refuse", "switches_on"]
+__all__ = ["HARMLESS", "MOVES_NOTHING", "reason_to_refuse", "switches_on"]
 
 _AS_POINTS = "output the tool path as points (GOTO)"
 _OTHER_FRAME = "it changes the coordinates that follow; export the path in the frame of the part"
 _REFUSED = {
     **dict.fromkeys(("NURBS", "KNOT", "CNTRL", "SPLINE", "GCONIC"), f"splines are not read; {_AS_POINTS}"),
     **dict.fromkeys(
-        ("COPY", "INDEX", "MACRO", "CALL", "LOOPST", "LOOPND", "JUMPTO", "IF", "DNTCUT"),
+        ("COPY", "INDEX", "MACRO", "CALL", "LOOPST", "LOOPND", "JUMPTO", "IF", "DNTCUT", "DEFSUB", "CALSUB", "ENDSUB"),
         "this is APT language, not CL data; run it through the APT processor first",
     ),
-    **dict.fromkeys(("ROTATE", "MIRROR", "SCALE", "REFSYS", "MATRIX"), _OTHER_FRAME),
+    **dict.fromkeys(("ROTATE", "MIRROR", "SCALE", "REFSYS", "MATRIX", "TRANSL", "COORD"), _OTHER_FRAME),
+    **dict.fromkeys(
+        ("MOVARC", "HELIX", "MOVETO", "POSITN"), f"it moves the tool in a way that is not read; {_AS_POINTS}"
+    ),
 }
 _FRAME_WORDS = ("TRANS", "ORIGIN", "ROTABL", "ROTHED", "TRNTYP", "TRACUT")
 
@@ -26,6 +30,12 @@ _NOT_ABOUT_MOTION = """
 """
 HARMLESS = frozenset(_NOT_ABOUT_MOTION.split())
 """Words that say nothing about the motion once they are not refused, and need no finding."""
+
+MOVES_NOTHING = (HARMLESS - {"CYCLE"}) | {
+    *("", *TEXT_WORDS, "UNIT", "UNITS", "MSYS", "CSYS", "FEDRAT", "SPINDL", "COOLNT", "DELAY", "TLAXIS", "RAPID"),
+    *("LOADTL", "LOAD", "TURRET", "SELECT", "TOOLNO", "STOP", "OPSTOP", "FINI", "END"),
+}
+"""Words of statements that may be left out at the end of a file, where none that moves follows."""
 
 
 def reason_to_refuse(word: str, arguments: str) -> str | None:
@@ -54,6 +64,8 @@ def reason_to_refuse(word: str, arguments: str) -> str | None:
         reason = f"incremental coordinates are not read; {_AS_POINTS}"
     elif word[0].isdigit() or word[0] in "+-.":
         reason = "numbers without a word; has the $ at the end of the line before been lost?"
+    elif "=" in word and (arguments.strip() or word.rpartition("=")[2].startswith("GO")):
+        reason = _REFUSED["MACRO"]
     elif word not in HARMLESS and len(numbers) in (3, 6) and not words and _like_goto(word):
         reason = "not known, but much like GOTO; is the file damaged? Correct the line"
     return reason

@@ -21,6 +21,7 @@ __all__ = ["AptOriginal"]
 _SAME_MM, _SAME_AXIS = 5e-5, 1e-7
 _AGREES_MM, _AGREES_AXIS = 2e-4, 1e-6
 _SMALLEST_TURN_DEG = 1e-4
+_MOST_NAMED = 5
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _REPAIRS = {Notice.LAST_STATEMENT_DROPPED, Notice.STATEMENT_AS_TEXT, Notice.PADDING_DROPPED}
 
@@ -70,6 +71,10 @@ class AptOriginal:
         goal = self._goal(reader, before, path, source, tally)
         if not goal.changed.any():
             return self.content
+        if kept := reader.numbers_kept:
+            more = f" and {len(kept) - _MOST_NAMED} more" if len(kept) > _MOST_NAMED else ""
+            named = ", ".join(kept[:_MOST_NAMED])
+            raise _NoWordsError(f"statements that are not known hold numbers that would stay: {named}{more}")
         text, mark, encoding = decoded(self.content)
         ends = [*_LINE_END.findall(text), ""]
         written = Walk(reader, goal, _LINE_END.split(text), ends, tally).text()
@@ -110,7 +115,7 @@ class AptOriginal:
     def _verify(self, content: bytes, goal: Goal, feeds: FloatArray) -> None:
         """Read what was written, and refuse it if it does not give the path back."""
         try:
-            reader = execute(self.path, content, self.options)
+            reader = execute(self.path, content, self.options, trusted=True)
         except InputError as error:
             raise _NoWordsError(f"what was written is not readable ({error})") from None
         after, limit_mm = _Moves.of(reader, self.options), self.options.limits.coordinate_mm

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sicp_cam.errors import FormatError
 
-__all__ = ["COMMENT", "TEXT_WORDS", "last_line", "split_line", "statements", "statements_of"]
+__all__ = ["COMMENT", "TEXT_WORDS", "last_line", "split_line", "statements", "statements_of", "word_of"]
 
 COMMENT = "$$"
 """The word under which comments are handed out."""
@@ -16,8 +16,8 @@ COMMENT = "$$"
 TEXT_WORDS = ("PARTNO", "PPRINT", "TPRINT", "INSERT", "LETTER", "REMARK", "TITLES")
 """Statements whose rest of the line is text, with or without a slash, whatever stands in it."""
 
-_TEXT = re.compile(rf"\s*({'|'.join(TEXT_WORDS)})\b\s*/?(.*)", re.IGNORECASE | re.ASCII | re.DOTALL)
-_LABEL = re.compile(r"[A-Z0-9]+\)", re.ASCII)
+_TEXT = re.compile(rf"\s*(?:N[0-9]+\s*)?({'|'.join(TEXT_WORDS)})\b\s*/?(.*)", re.IGNORECASE | re.ASCII | re.DOTALL)
+_LABEL = re.compile(r"[A-Z0-9]+\)|N[0-9]+(?=[A-Z])", re.ASCII)
 _QUOTE_OR_DOLLAR = re.compile(r"'[^']*'|\$\$?")
 
 
@@ -51,6 +51,23 @@ def statements_of(
         yield number, text[1].upper(), text[2].strip()
         return
     yield from _assembled(path, number, line, numbered)
+
+
+def word_of(line: str) -> str:
+    """Return the word of the statement that begins in a line, without label or number; "" if none does.
+
+    >>> word_of("N7 GOTO / 1,2,$"), word_of("  $$ GOTO")
+    ('GOTO', '')
+    """
+    if text := _TEXT.match(line):
+        return text[1].upper()
+    return _without_label(split_line(line)[0].partition("/")[0])
+
+
+def _without_label(word: str) -> str:
+    word = "".join(word.upper().split())
+    label = _LABEL.match(word)
+    return word[label.end() :] if label else word
 
 
 def last_line(lines: list[str], first: int) -> int:
@@ -91,10 +108,7 @@ def _assembled(
 
 def _statement(path: Path, number: int, code: str) -> Iterator[tuple[int, str, str]]:
     word, slash, arguments = code.partition("/")
-    word = "".join(word.upper().split())
-    if label := _LABEL.match(word):
-        word = word[label.end() :]
-    if word:
+    if word := _without_label(word):
         yield number, word, arguments
     elif slash:
         raise FormatError(path, "arguments without a word before the slash; correct the line", line=number)

@@ -249,9 +249,10 @@ class Walk:
             if output > outputs[0] and self._goal.old_rapid[first]:
                 text.append(f"{self._rapid_text}{line_end}")
             ends_here = output == outputs[-1] and own
-            text.append(
-                self._point(layout, output, layout.lead if ends_here else goto, layout.tail if ends_here else "")
-            )
+            if ends_here:
+                text.append(self._point(layout, output, layout.lead, layout.tail))
+            else:
+                text.append(self._point(layout.without_comments(), output, goto, ""))
             text.append(line_end if output < outputs[-1] else self._ends[last - 1])
         comments = "" if own else comments_of(self._raw(line, last))
         self._edits[line] = (last, comments + "".join(text))

@@ -14,14 +14,17 @@ import numpy as np
 from sicp_cam.errors import FormatError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
-from sicp_cam.model import FloatArray, Scan
+from sicp_cam.model import BoolArray, FloatArray, Scan
 from sicp_cam.units import mm_per_unit
 from sicp_formats.ascii.columns import Columns, option_columns
-from sicp_formats.ascii.dialect import DELIMITERS, Dialect, find_dialect, likely_rows
-from sicp_formats.ascii.head import Head, columns_of_header, read_head
+from sicp_formats.ascii.dialect import DELIMITERS, Dialect, find_dialect, likely_rows, may_be_thousands
+from sicp_formats.ascii.head import Head, check_comments, columns_of_header, read_head, stated_unit
 from sicp_formats.ascii.proof import proven_columns
 from sicp_formats.ascii.rows import RowReader
-from sicp_formats.surfaces.checks import Code, check_coordinates, check_registrable, origin_points, unit_normals
+from sicp_formats.ascii.table import places
+from sicp_formats.surfaces.checks import Code, check_registrable, no_return_points
+from sicp_formats.surfaces.point_rows import point_rows
+from sicp_formats.surfaces.unit import StatedUnit, chosen_unit, one_unit
 from sicp_formats.tables.rows import NUMBER, Row
 from sicp_formats.tables.stream import TextStream, open_text
 
@@ -47,8 +50,8 @@ def read_scan(
         of rows or the names of the columns before the first row. With numbers of rows, several scans may follow one
         another.
     units
-        Unit of the coordinates, one of `sicp_cam.units.MM_PER_UNIT`; if left out, that of the header, such as
-        `X [mm]` or `x_mm`, or else millimetres.
+        Unit of the coordinates, one of `sicp_cam.units.MM_PER_UNIT`; if left out, that of the header or of a comment,
+        such as `X [mm]`, `x_mm` or `# unit: mm`, or else millimetres.
     limits
         Caps on what the file may ask for.
     recover
@@ -75,21 +78,25 @@ def read_scan(
     JobError
         If an option is wrong.
     UnitError
-        If the unit is unknown.
+        If the unit is unknown, or not the one that the file states.
     """
     mm_per_unit("mm" if units is None else units)
     told = option_columns(columns) if columns is not None else None
     with open_text(path, limits) as stream:
         head = read_head(path, stream.head(), limits)
-        told = told or columns_of_header(path, head, units, recover)
+        named = columns_of_header(path, head, units, recover) if told is None else None
+        told = told or named
         sample = likely_rows(head.sample, told.needed if told else None, delimiter, decimal) if recover else head.sample
         reader, told = _reader(path, sample, told, (delimiter, decimal), limits, recover)
+        stated = StatedUnit(named.unit, named.line) if named and named.unit else None
+        unit = chosen_unit(path, one_unit(path, stated_unit(path, head), stated), units)
+        doubtful = decimal is None and may_be_thousands(sample, reader.dialect)
         if head.count is not None:
             reader.begin_scan(head.count, head.count_line)
         while stream.line < head.line:
             stream.take(head.line - stream.line)
         reader.read(stream)
-        return _scan(stream, reader, head, told, units, columns)
+        return _scan(stream, reader, head, told, unit, columns, doubtful)
 
 
 def _reader(
@@ -144,42 +151,40 @@ def _is_number(cell: str, dialect: Dialect) -> bool:
 
 
 def _scan(
-    stream: TextStream, reader: RowReader, head: Head, told: Columns | None, units: str | None, columns: str | None
+    stream: TextStream,
+    reader: RowReader,
+    head: Head,
+    told: Columns | None,
+    chosen: tuple[str, bool, tuple[Finding, ...]],
+    columns: str | None,
+    doubtful: bool,
 ) -> Scan:
-    """Make a scan of the rows that were read."""
+    """Make a scan of the rows that were read; `doubtful` tells that their marks may set thousands apart."""
     path, table = reader.path, reader.table
     if not len(table):
         raise FormatError(path, "no points; export the scan again", line=head.count_line or 1)
+    if told is None:
+        check_comments(path, head, table.width)
     placed = told.among(reader.used) if told else proven_columns(path, table, table.line(0))
-    unit = units if units is not None else placed.unit or "mm"
-    points, normals, *further = table.empty_into([placed.xyz, placed.normal, *(at for _, at in placed.further)])
-    if unit != "mm":
-        with np.errstate(over="ignore"):  # the check of the coordinates tells the line
-            points *= mm_per_unit(unit)
+    unit, stated, units_found = chosen
+    dialect = reader.dialect if doubtful and table.every(slice(0, table.width), _one_to_thousand) else None
 
     def place(row: int) -> dict[str, int]:
         return {"line": table.line(row)}
 
-    check_coordinates(path, points, place, reader.limits)
-    findings = reader.findings() + _findings(path, head, placed, told is None, units, columns)
-    found: tuple[Finding, ...] = ()
-    if placed.normal:
-        normals, found = unit_normals(path, normals, place)
-    check_registrable(path, points)
-    findings += found + origin_points(path, points)
-    source = stream.source(format="ASCII", unit=unit, unit_stated=units is not None or placed.unit is not None)
-    named = {name: _locked(values) for (name, _), values in zip(placed.further, further, strict=True)}
-    return Scan(_locked(points), _locked(normals) if placed.normal else None, None, source, findings, named)
-
-
-def _locked(values: FloatArray) -> FloatArray:
-    """Return an array that nobody changes any more, so that the scan need not copy it."""
-    values.setflags(write=False)
-    return values
+    names = places(placed.xyz, placed.normal, [at for _, at in placed.further])
+    mm, limits, recover = mm_per_unit(unit), reader.limits, reader.recover
+    rows, found = point_rows(path, table.emptied(), names, place, mm, limits, recover=recover)
+    check_registrable(path, rows.points_mm)
+    findings = reader.findings() + units_found + _findings(path, head, placed, told is None, columns, dialect)
+    findings += found + no_return_points(path, rows.at_origin)
+    source = stream.source(format="ASCII", unit=unit, unit_stated=stated)
+    named = {name: rows.columns[str(at)] for name, at in placed.further}
+    return Scan(rows.points_mm, rows.normals, None, source, findings, named)
 
 
 def _findings(
-    path: Path, head: Head, placed: Columns, proven: bool, units: str | None, columns: str | None
+    path: Path, head: Head, placed: Columns, proven: bool, columns: str | None, doubtful: Dialect | None
 ) -> tuple[Finding, ...]:
     findings = []
     if placed.ignored:
@@ -193,7 +198,16 @@ def _findings(
         message = f"{len(skipped)} lines of text before the first row were skipped"
         level = Level.INFO if columns is not None else Level.WARN  # without names, a repair may have skipped them
         findings.append(Finding(Code.LINES_SKIPPED, level, message, f"{path}, line {skipped[0]}"))
-    if units is not None and placed.unit not in (None, units):
-        message = f"the header states {placed.unit}, the user {units}, which was followed"
-        findings.append(Finding(Code.UNIT_OVERRULED, Level.WARN, message, str(path)))
+    if doubtful is not None:
+        message = (
+            f"every number has exactly 3 digits behind its {doubtful.mark!r}, as if it set thousands apart; it was "
+            f"taken as the decimal mark: confirm it with --set scan.decimal={doubtful.mark}"
+        )
+        findings.append(Finding(Code.MARKS_MAY_BE_THOUSANDS, Level.WARN, message, str(path)))
     return tuple(findings)
+
+
+def _one_to_thousand(block: FloatArray) -> BoolArray:
+    sizes = np.abs(block)
+    passed: BoolArray = np.logical_and.reduce((sizes >= 1.0) & (sizes < 1000.0), axis=1)
+    return passed

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sicp_cam.errors import FormatError, JobError
 from sicp_cam.units import MM_PER_UNIT
+from sicp_formats.surfaces.unit import known_unit
 
 __all__ = ["COLUMN_HINT", "Columns", "known_names", "named_columns", "option_columns", "split_header"]
 
@@ -29,9 +30,8 @@ _ALIASES = {
         ("", "normal", "n"),
     )
 }
-_UNIT_NAMES = {**{name: name for name in MM_PER_UNIT}, "in": "inch", "millimeter": "mm", "meter": "m"}
 _BRACKET = re.compile(r"\s*[\[(]([^\])]*)[\])]")
-_UNIT_ENDING = re.compile(r"_(mm|cm|m|inch|in)$", re.IGNORECASE)
+_UNIT_ENDING = re.compile(r"(?:_|\s*/\s*|\s+in\s+)(mm|cm|m|inch|in)\s*$", re.IGNORECASE)
 _CELL = re.compile(r'"([^"]*)"|\'([^\']*)\'')
 _LONG_NAMES = {"r": "red", "g": "green", "b": "blue", "a": "alpha", "i": "intensity"}
 
@@ -52,7 +52,7 @@ class Columns:
     normal
         Those of the normal, or () where there is none.
     unit
-        Unit that a header states for the coordinates, None if it states none.
+        Unit that a header states for the coordinates, or its word for one that is not known; None if it states none.
     further
         Name and column of each further number.
     ignored
@@ -154,6 +154,8 @@ def known_names(names: Sequence[str]) -> list[str]:
 
     >>> known_names(["X [mm]", "y_mm", "PosZ", "Normal_X", "Quality"])
     ['x', 'y', 'z', 'nx', 'quality']
+    >>> known_names(["X/mm", "Y in inch"])
+    ['x', 'y']
     """
     plain = [re.sub(r"[_\s.]", "", _UNIT_ENDING.sub("", _BRACKET.sub("", name))).lower() for name in names]
     known = [_ALIASES.get(name, name) for name in plain]
@@ -196,12 +198,13 @@ def named_columns(path: Path, names: Sequence[str], line: int, *, unit_matters: 
         for name, role in zip(names, known, strict=True)
         if role in _XYZ and (match := _BRACKET.search(name) or _UNIT_ENDING.search(name))
     }
-    if unit_matters and (len(stated) > 1 or not stated <= {*_UNIT_NAMES}):
+    known_units = {known_unit(word) or word for word in stated}
+    if unit_matters and (len(known_units) > 1 or not known_units <= {*MM_PER_UNIT}):
         what = (
             f"the header states the unit {' and '.join(sorted(stated))}; state one of {', '.join(MM_PER_UNIT)} yourself"
         )
         raise FormatError(path, what, line=line)
-    unit = _UNIT_NAMES.get(next(iter(stated))) if len(stated) == 1 else None
+    unit = next(iter(known_units)) if len(known_units) == 1 else None
     return replace(_placed(names, known, unit), line=line)
 
 

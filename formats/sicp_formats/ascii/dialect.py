@@ -19,7 +19,7 @@ from typing import TypeAlias
 from sicp_cam.errors import FormatError, JobError
 from sicp_formats.tables.rows import NUMBER, Row, cells
 
-__all__ = ["DELIMITERS", "Dialect", "find_dialect", "likely_rows"]
+__all__ = ["DELIMITERS", "Dialect", "find_dialect", "likely_rows", "may_be_thousands"]
 
 DELIMITERS = (";", "\t", ",", None)
 """What may separate cells; None is any run of blanks."""
@@ -41,6 +41,8 @@ _GROUPED = {
     ".": re.compile(r"[+-]?[0-9]{1,3}(?:,[0-9]{3})+(?:\.[0-9]*)?"),
     ",": re.compile(r"[+-]?[0-9]{1,3}(?:\.[0-9]{3})+(?:,[0-9]*)?"),
 }
+_ONE_GROUP = {mark: re.compile(rf"[+-]?[1-9][0-9]{{0,2}}\{mark}[0-9]{{3}}") for mark in _OTHER}
+_QUOTED_COMMA = re.compile(rb'"[^",]*,[^"]*"')
 _QUOTED = re.compile(rb'"([^"]*)"')
 _MAY_BE_NUMBER = re.compile(rb"\s*[-+0-9.,eE]*\s*")
 _GAPS = re.compile(rb"[\s;,]")
@@ -62,7 +64,7 @@ class Dialect:
     trailing
         True if each row ends with a delimiter behind its last cell.
     quoted
-        True if cells may stand in quotes.
+        True if cells may stand in quotes. A comma can then be both delimiter and decimal mark: the mark within quotes.
     """
 
     delimiter: str | None
@@ -80,9 +82,11 @@ class Dialect:
             If a cell holds the other mark where it cannot set thousands apart.
         """
         number, text = row
-        text = _unquoted(text) if self.quoted else text
+        text = self._unquoted(text) if self.quoted else text
         if self.trailing and self.delimiter:
             text = text.removesuffix(self.delimiter.encode("ascii"))
+        if self.delimiter == self.mark:
+            return text
         other = _OTHER[self.mark].encode("ascii")
         if other in text and (self.mark == "," or self.grouped) and self.delimiter != _OTHER[self.mark]:
             for cell in cells(text, self.delimiter):
@@ -99,8 +103,22 @@ class Dialect:
 
     def words(self, text: bytes) -> list[str]:
         """Return the cells of a row, without the empty one behind a delimiter at its end."""
-        found = cells(_unquoted(text) if self.quoted else text, self.delimiter)
+        found = cells(self._unquoted(text) if self.quoted else text, self.delimiter)
         return found[:-1] if self.trailing and found[-1] == "" else found
+
+    @property
+    def mark_of_words(self) -> str:
+        """The decimal mark in what `words` returns."""
+        return "." if self.delimiter == self.mark else self.mark
+
+    def _unquoted(self, text: bytes) -> bytes:
+        """Return a row without quotes; what separates cells within them does so no longer."""
+
+        def inside(match: re.Match[bytes]) -> bytes:
+            cell = match[1] if _MAY_BE_NUMBER.fullmatch(match[1]) else _GAPS.sub(b"_", match[1])
+            return cell.replace(b",", b"." if self.mark == "," else b"_") if self.delimiter == "," else cell
+
+        return _QUOTED.sub(inside, text)
 
     def __str__(self) -> str:
         return f"delimiter {_NAMES[self.delimiter]}, decimal {self.mark!r}"
@@ -176,13 +194,6 @@ def _is_finite(reading: _Reading | None) -> bool:
     return reading is not None and all(math.isfinite(value) for value in reading[0])
 
 
-def _unquoted(text: bytes) -> bytes:
-    """Return a row without quotes; what separates words within them does so no longer."""
-    return _QUOTED.sub(
-        lambda match: match[1] if _MAY_BE_NUMBER.fullmatch(match[1]) else _GAPS.sub(b"_", match[1]), text
-    )
-
-
 def _options(delimiter: str | None, decimal: str | None) -> tuple[tuple[str | None, ...], tuple[str, ...]]:
     problems = []
     if delimiter is not None and delimiter not in _DELIMITER_WORDS:
@@ -200,9 +211,10 @@ def _options(delimiter: str | None, decimal: str | None) -> tuple[tuple[str | No
 
 def _reading(rows: Sequence[Row], dialect: Dialect, used: Sequence[int] | None) -> _Reading | None:
     """Return the numbers of the rows as the dialect reads them, or None where it does not fit."""
-    if dialect.delimiter == dialect.mark:
+    mark = dialect.mark_of_words
+    if dialect.delimiter == dialect.mark and not any(_QUOTED_COMMA.search(text) for _, text in rows):
         return None
-    plain, grouped, other = _PLAIN[dialect.mark], _GROUPED[dialect.mark], _OTHER[dialect.mark]
+    plain, grouped, other = _PLAIN[mark], _GROUPED[mark], _OTHER[mark]
     values: list[tuple[float, ...]] = []
     width = len(dialect.words(rows[0][1]))
     # 1.234 may be either number: it reads as thousands only where other cells show what the decimal mark is.
@@ -214,7 +226,7 @@ def _reading(rows: Sequence[Row], dialect: Dialect, used: Sequence[int] | None) 
         numeric = words if used is None else [words[column] for column in used]
         if not all(plain.fullmatch(word) or (dialect.grouped and grouped.fullmatch(word)) for word in numeric):
             return None
-        proven = proven or any(dialect.mark in word for word in numeric)
+        proven = proven or any(mark in word for word in numeric)
         found = [float(word.replace(other, "").replace(",", ".")) for word in numeric]
         # One and the same object for every nan, so that equal readings compare equal.
         values.append(tuple(math.nan if math.isnan(value) else value for value in found))
@@ -229,7 +241,8 @@ def _nothing_fits(
     marks: Sequence[str],
 ) -> FormatError:
     """Name the first row at which the dialect that carries furthest fails."""
-    dialects = [Dialect(delimiter, mark) for delimiter, mark in product(delimiters, marks)]
+    quoted = any(b'"' in text for _, text in rows)
+    dialects = [Dialect(delimiter, mark, quoted=quoted) for delimiter, mark in product(delimiters, marks)]
     reach = max(_rows_that_fit(rows, dialect, used) for dialect in dialects)
     number, text = rows[min(reach, len(rows) - 1)]
     shown = text.decode("latin-1")
@@ -251,18 +264,31 @@ def _rows_that_fit(rows: Sequence[Row], dialect: Dialect, used: Sequence[int] | 
 
 
 def _refuse_comma_pairs(path: Path, rows: Sequence[Row], dialect: Dialect) -> None:
-    """Refuse 1,25,-3,50,7,00: it may be three numbers with decimal commas, or six whole ones."""
+    """Refuse 1,25,-3,50,7,00,9: it may be three numbers with decimal commas and a whole one, or seven whole ones."""
     words = [dialect.words(text) for _, text in rows]
-    if dialect.delimiter != "," or len(words[0]) < 6 or len(words[0]) % 2:
+    if (dialect.delimiter, dialect.mark) != (",", ".") or len(words[0]) < 6:
         return
-    whole = all(word.lstrip("+-").isdigit() for row in words for word in row)
-    if whole and all(word.isdigit() for row in words for word in row[1::2]):
-        pairs = " ".join(f"{a}.{b}" for a, b in zip(words[0][::2], words[0][1::2], strict=True))
+    if all(word.lstrip("+-").isdigit() for row in words for word in row):
+        pairs = [f"{a}.{b}" for a, b in zip(words[0][::2], words[0][1::2], strict=False)] + words[0][-1:] * (
+            len(words[0]) % 2
+        )
         what = (
-            f"reads as {' '.join(words[0])} or, with decimal commas, as {pairs}; set --set scan.decimal=. if the "
-            "numbers are whole, otherwise export with another delimiter"
+            f"reads as {' '.join(words[0])} or, with decimal commas, perhaps as {' '.join(pairs)}; set "
+            "--set scan.decimal=. if the numbers are whole, otherwise export with another delimiter"
         )
         raise FormatError(path, what, line=rows[0][0])
+
+
+def may_be_thousands(rows: Sequence[Row], dialect: Dialect) -> bool:
+    """Tell whether the mark of rows between blanks may set thousands apart: 3 digits behind it, at most 3 before.
+
+    >>> may_be_thousands([(1, b"1.234 -5.678 3.522")], Dialect(None, "."))
+    True
+    """
+    pattern = _ONE_GROUP[dialect.mark]
+    return dialect.delimiter is None and all(
+        pattern.fullmatch(word) for _, text in rows for word in dialect.words(text)
+    )
 
 
 def _shown(values: Sequence[float]) -> str:

@@ -10,15 +10,21 @@ from pathlib import Path
 
 from sicp_cam.errors import FormatError
 from sicp_cam.limits import Limits
-from sicp_formats.ascii.columns import Columns, known_names, named_columns, split_header
-from sicp_formats.ascii.dialect import DELIMITERS
+from sicp_formats.ascii.columns import COLUMN_HINT, Columns, known_names, named_columns, split_header
+from sicp_formats.ascii.dialect import DELIMITERS, Dialect
 from sicp_formats.ascii.rows import COUNT, all_rows, is_comment
-from sicp_formats.tables.rows import NUMBER, Row, cells
+from sicp_formats.surfaces.unit import StatedUnit, unit_in
+from sicp_formats.tables.rows import NUMBER, Row
 from sicp_formats.tables.stream import Block
 
-__all__ = ["Head", "columns_of_header", "read_head"]
+__all__ = ["Head", "check_comments", "columns_of_header", "read_head", "stated_unit"]
 
 _SAMPLE_ROWS = 200
+_TITLE = re.compile(
+    r"[#/;\s]*(?:(?:the|of|column|point|scan|data|file)\s+)*"
+    r"(?:columns?|fields?|formats?|header|layout|order|coordinates|names|axes|points?|data)\s*[:=]\s*",
+    re.IGNORECASE,
+)
 _HINT = "mark comments with '#', or name the columns with --set scan.columns=x,y,z,..."
 
 
@@ -98,12 +104,60 @@ def columns_of_header(path: Path, head: Head, units: str | None, recover: bool) 
             what = f"{_decoded(text)[:60]!r} neither is a row of numbers nor names the columns x, y, z; {_HINT}"
             raise FormatError(path, what, line=line)
         return found
-    widths = {len(cells(head.sample[0][1], delimiter)) for delimiter in DELIMITERS}
+    widths = {len(Dialect(delimiter, ".", quoted=True).words(head.sample[0][1])) for delimiter in DELIMITERS}
+    placed: Columns | None = None
     for line, text in sorted(head.comments + head.texts, reverse=True):
-        names = split_header(_decoded(text))
+        names = split_header(_TITLE.sub("", _decoded(text), count=1))
         if len(names) in widths and {"x", "y", "z"} <= {*known_names(names)}:
-            return named_columns(path, names, line, unit_matters=units is None)
-    return None
+            found = named_columns(path, names, line, unit_matters=units is None)
+            if placed and found and found.xyz != placed.xyz:
+                what = f"the comment names other columns than line {placed.line}; remove one, or {COLUMN_HINT}"
+                raise FormatError(path, what, line=line)
+            placed = placed or found
+    return placed
+
+
+def check_comments(path: Path, head: Head, columns: int) -> None:
+    """Refuse comments that name x, y and z and do not fit x y z in the first columns, where nothing else names them.
+
+    Of three columns they may say anything that keeps this order; of more, nothing may stand before x.
+
+    Parameters
+    ----------
+    path, head
+        The file and its head.
+    columns
+        Columns of each row.
+
+    Raises
+    ------
+    FormatError
+        With the line of the comment.
+    """
+    for line, text in head.comments + head.texts:
+        shown = _decoded(text)
+        names = known_names(re.findall(r"[^\W\d]\w*", _TITLE.sub("", shown, count=1)))
+        if not {"x", "y", "z"} <= {*names}:
+            continue
+        first = [names.index(axis) for axis in "xyz"]
+        more = columns == 3 and {"nx", "ny", "nz", "i", "intensity", "r", "red"} & {*names}
+        if first != sorted(first) or (columns > 3 and first[0]) or more:
+            what = f"the comment {shown[:60]!r} does not fit the {columns} columns taken as x y z and more"
+            raise FormatError(path, f"{what}; {COLUMN_HINT}", line=line)
+
+
+def stated_unit(path: Path, head: Head) -> StatedUnit | None:
+    """Return the unit that the lines before the first row state, None if they state none.
+
+    Raises
+    ------
+    FormatError
+        If they state two.
+    """
+    unit = None
+    for line, text in sorted(head.comments + head.texts):
+        unit = unit_in(path, _decoded(text).lstrip("#/; \t"), line, unit)
+    return unit
 
 
 def _names_points(text: bytes) -> bool:

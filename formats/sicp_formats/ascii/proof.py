@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import permutations
 from pathlib import Path
 
@@ -29,15 +29,29 @@ _BY_SUFFIX = {
     (".pts", 1): ("intensity",),
     (".pts", 4): ("intensity", "colour"),
 }
+# Layouts in which four columns before the others are taken as x y z and an intensity, and not as a number and x y z.
+_FOUR_BEFORE = (("intensity", "colour"),)
 _WIDEST_SHOWN = 12
-_USUAL = ("x,y,z,nx,ny,nz", "x,y,z,r,g,b", "r,g,b,x,y,z", "x,y,z,i,r,g,b", "x,y,z")
+_NUMBERED = ("skip,x,y,z,nx,ny,nz", "skip,x,y,z,r,g,b", "skip,x,y,z", "x,y,z,nx,ny,nz", "x,y,z,r,g,b", "x,y,z")
+_USUAL = (
+    "skip,x,y,z",
+    "skip,x,y,z,nx,ny,nz",
+    "x,y,z,i,nx,ny,nz",
+    "x,y,z,nx,ny,nz",
+    "x,y,z,r,g,b",
+    "r,g,b,x,y,z",
+    "x,y,z,i,r,g,b",
+    "x,y,z",
+)
 
 
 def proven_columns(path: Path, table: Table, line: int) -> Columns:
     """Place the columns of a table without names: x y z, and behind them what is proven.
 
     Unit vectors in nearly all rows are normals (the others being zero), whole numbers 0..255 colours, one more column
-    an intensity. Where the order of colours and intensity stays open, they are called by the number of their column.
+    behind them an intensity. Where the order of colours and intensity stays open, they are called by the number of
+    their column. A first column of whole numbers that never fall may number the points and proves nothing, nor does a
+    fourth column: both are asked for where the suffix does not settle them.
 
     Parameters
     ----------
@@ -54,10 +68,14 @@ def proven_columns(path: Path, table: Table, line: int) -> Columns:
     count = table.width
     if count == 3:
         return Columns(3, (0, 1, 2), ())
-    if len(table) > 1 and _counts_up(table):
-        what = f"{count} columns, of which the first counts the rows; {_choices(count, ('skip,x,y,z', 'x,y,z'))}"
-        raise FormatError(path, what, line=line)
     layouts = _layouts(path, table)
+    settled = layouts == [_by_suffix(path, count)]
+    if len(table) > 1 and (_counts_up(table) or (not settled and _never_falls(table))):
+        what = f"{count} columns, of which the first may number the points: whole numbers that never fall"
+        raise FormatError(path, f"{what}; {_choices(count, _NUMBERED)}", line=line)
+    if not settled and any(layout[0] == "intensity" and layout not in _FOUR_BEFORE for layout in layouts):
+        what = f"{count} columns without names: the first may number the points, or the fourth be an intensity"
+        raise FormatError(path, f"{what}; {_choices(count, _USUAL)}", line=line)
     places = {_normal_place(layout) for layout in layouts}
     coloured = any("colour" in layout for layout in layouts)
     if len(places) != 1 or (coloured and not _by_suffix(path, count) and table.every(slice(0, 3), _are_colours)):
@@ -78,6 +96,8 @@ def _choices(count: int, beginnings: Sequence[str]) -> str:
     """Return the options that would settle what so many columns are, filled up with columns to skip."""
     fitting = [names for names in beginnings if names.count(",") < count <= _WIDEST_SHOWN]
     exact = [names for names in fitting if names.count(",") == count - 1]
+    if not exact and "skip,x,y,z" in fitting:
+        exact.append("skip,x,y,z" + ",skip" * (count - 4))
     if (plain := "x,y,z") in fitting:
         exact.append(plain + (",i" if count == 4 else ",skip" * (count - 3)))
     if not exact:
@@ -155,10 +175,25 @@ def _are_colours(block: FloatArray) -> BoolArray:
 
 
 def _counts_up(table: Table) -> bool:
+    return _steps(table, lambda steps: steps == 1.0)
+
+
+def _never_falls(table: Table) -> bool:
+    return table.every(slice(0, 1), _are_whole) and _steps(table, lambda steps: steps >= 0.0)
+
+
+def _are_whole(block: FloatArray) -> BoolArray:
+    passed: BoolArray = (block == np.trunc(block)).all(axis=1)
+    return passed
+
+
+def _steps(table: Table, test: Callable[[FloatArray], BoolArray]) -> bool:
+    """Tell whether each step from one number of the first column to the next passes a test."""
     last = None
     for piece in table.pieces():
         numbers = piece[:, 0] if last is None else np.concatenate([[last], piece[:, 0]])
-        if not (np.diff(numbers) == 1.0).all():
-            return False
+        with np.errstate(over="ignore", invalid="ignore"):
+            if not test(np.diff(numbers)).all():
+                return False
         last = numbers[-1]
     return True

@@ -19,8 +19,9 @@ from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import FloatArray, IntArray, Scan
 from sicp_cam.units import mm_per_unit
 from sicp_formats.ascii.rows import COUNT, all_rows
-from sicp_formats.ascii.table import Table
-from sicp_formats.surfaces.checks import Code, check_coordinates, check_registrable
+from sicp_formats.ascii.table import Table, places
+from sicp_formats.surfaces.checks import Code, check_registrable
+from sicp_formats.surfaces.point_rows import point_rows
 from sicp_formats.tables.blocks import quick_numbers
 from sicp_formats.tables.rows import Row, cells, numbers
 from sicp_formats.tables.stream import Block, TextStream, open_text
@@ -33,8 +34,9 @@ _FURTHER = {
     6: ("red", "green", "blue"),
     7: ("intensity", "red", "green", "blue"),
 }
-# Matrices are written with six decimals or so.
 _RIGID_TOLERANCE = 1e-3
+# Matrices are written with six decimals or so; what is off by more is a scale or a shear, and told.
+_ROUNDED_TOLERANCE = 1e-5
 _HEADER_WIDTHS = (3, 3, 3, 3, 4, 4, 4, 4)
 
 
@@ -91,15 +93,19 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
         if table is None or not len(table):
             raise FormatError(path, "no ray returned; export the scan again", line=1)
         names = _FURTHER[table.width]
-        points, *further = table.empty_into([(0, 1, 2), *range(3, table.width)])
-        with np.errstate(over="ignore"):  # the check of the coordinates tells the line
-            points *= mm
-        check_coordinates(path, points, lambda row: {"line": table.line(row)}, limits)
-        check_registrable(path, points)
+        rows, found = point_rows(
+            path,
+            table.emptied(),
+            places((0, 1, 2), (), range(3, table.width)),
+            lambda row: {"line": table.line(row)},
+            mm,
+            limits,
+            recover=recover,
+        )
+        check_registrable(path, rows.points_mm)
         source = stream.source(format="PTX", unit=unit, unit_stated=units is not None)
-    for values in (points, *further):
-        values.setflags(write=False)  # so that the scan need not copy them
-    return Scan(points, None, None, source, reader.findings(units), dict(zip(names, further, strict=True)))
+    columns = {name: rows.columns[str(at)] for at, name in enumerate(names, 3)}
+    return Scan(rows.points_mm, None, None, source, reader.findings(units) + found, columns)
 
 
 class _Reader:
@@ -110,6 +116,7 @@ class _Reader:
         self.table: Table | None = None
         self.scans = self.rays = 0
         self._cut = ""
+        self._not_rigid: tuple[int, float] | None = None
 
     def read(self) -> None:
         """Read all scans."""
@@ -130,6 +137,13 @@ class _Reader:
         if lost:
             message = f"{lost} of {self.rays} rays did not return (0 0 0) and were dropped"
             found.append(Finding(Code.NO_RETURN, Level.INFO, message, str(self.path)))
+        if self._not_rigid:
+            line, off = self._not_rigid
+            message = (
+                f"the axes of a matrix are off from a rotation by {off:.1e}, as by a scale; the nearest rotation was "
+                "taken: check the registration of the scans"
+            )
+            found.append(Finding(Code.MATRIX_NOT_RIGID, Level.WARN, message, f"{self.path}, line {line}"))
         if self._cut:
             found.append(Finding(Code.SCAN_CUT, Level.WARN, self._cut, str(self.path)))
         return tuple(found)
@@ -148,9 +162,13 @@ class _Reader:
             raise FormatError(self.path, what, line=second[0] if second else first[0])
         lines = [self._header_row(width, first[0]) for width in _HEADER_WIDTHS]
         matrix = np.vstack([values for _, values in lines[4:]])
-        if not _is_rigid(matrix):
+        off = _off_rigid(matrix)
+        if off > _RIGID_TOLERANCE:
             what = "the 4 x 4 matrix is no rigid motion with its translation in the last row; export the scan again"
             raise FormatError(self.path, what, line=lines[4][0])
+        if off > _ROUNDED_TOLERANCE:
+            self._not_rigid = self._not_rigid or (lines[4][0], off)
+            matrix[:3, :3] = _nearest_rotation(matrix[:3, :3])
         grid = _Grid(int(first[1]), int(second[1]), matrix, first[0])
         if grid.size > self.limits.points:
             what = (
@@ -232,7 +250,7 @@ class _Reader:
             lines = at + lines if isinstance(lines, int) else lines[at]
         with np.errstate(over="ignore", invalid="ignore"):  # the check of the coordinates tells the line
             moved = values[:, :3] @ matrix[:3, :3] + matrix[3, :3]
-        self.table.append(np.hstack([moved, values[:, 3:]]), lines)
+        self.table.append([*moved.T, *values[:, 3:].T], lines)
         if len(self.table) > self.limits.points:
             what = f"more points than the limit points = {self.limits.points}; raise it"
             raise FormatError(self.path, what, line=self.table.line(self.limits.points))
@@ -245,10 +263,16 @@ class _Reader:
         self._cut = f"the last scan is cut short: {what}"
 
 
-def _is_rigid(matrix: FloatArray) -> bool:
-    if np.abs(matrix[:, 3] - (0.0, 0.0, 0.0, 1.0)).max() > _RIGID_TOLERANCE:
-        return False
+def _off_rigid(matrix: FloatArray) -> float:
+    """Return how far a matrix is from a rigid motion: 0 for one, infinity for what is none at all."""
     axes = matrix[:3, :3]
-    if np.abs(axes).max() > 2.0:  # a first look that keeps products from overflowing
-        return False
-    return bool(np.abs(axes @ axes.T - np.eye(3)).max() <= _RIGID_TOLERANCE and np.linalg.det(axes) > 0.0)
+    if np.abs(axes).max() > 2.0 or not np.linalg.det(axes) > 0.0:  # the first keeps products from overflowing
+        return np.inf
+    last_column = np.abs(matrix[:, 3] - (0.0, 0.0, 0.0, 1.0)).max()
+    return float(max(last_column, np.abs(axes @ axes.T - np.eye(3)).max()))
+
+
+def _nearest_rotation(axes: FloatArray) -> FloatArray:
+    left, _, right = np.linalg.svd(axes)
+    nearest: FloatArray = left @ right
+    return nearest

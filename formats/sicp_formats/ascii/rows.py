@@ -18,7 +18,8 @@ from sicp_cam.model import FloatArray, IntArray
 from sicp_formats.ascii.dialect import Dialect
 from sicp_formats.ascii.table import Table
 from sicp_formats.surfaces.checks import Code
-from sicp_formats.tables.blocks import quick_numbers
+from sicp_formats.surfaces.ending import TAIL_BYTES, is_cut, last_line_cut
+from sicp_formats.tables.blocks import quick_columns
 from sicp_formats.tables.rows import NUMBER, Row, cells, numbers, text_lines
 from sicp_formats.tables.stream import Block, TextStream
 
@@ -30,7 +31,8 @@ COUNT = re.compile(rb"[0-9]{1,18}")
 # A row whose first cell is empty begins with a semicolon too, and must not pass for a comment.
 _COMMENT = re.compile(rb"#|//|;(?![\s;]*[-+.,]?[0-9])")
 _MARKS = b"#/;"
-_BLOCKS_AHEAD = 2
+_WORKERS = 2
+_BLOCKS_AHEAD = 4
 _CURE = "or repair it with --recover"
 
 
@@ -95,6 +97,7 @@ class RowReader:
         self._declared_line = self._begun = 0
         self._dropped = self._first_dropped = 0
         self._wrong_counts: list[tuple[int, str]] = []
+        self._tail, self._cut_line = b"", 0
 
     def read(self, stream: TextStream) -> None:
         """Read all rows that are left in a stream.
@@ -105,8 +108,12 @@ class RowReader:
             If a row is not like the others, a number is not finite where it must be, there are more points than the
             limit, or not as many rows as declared; if they are repaired, only if more than half of the rows are bad.
         """
-        for block, values in self._parsed(stream):
-            self._add(block, values)
+        for block, columns in self._parsed(stream):
+            self._tail = (block.text if len(block.text) >= TAIL_BYTES else self._tail + block.text)[-TAIL_BYTES:]
+            if not block.text.endswith(b"\n") and is_cut(self._tail, self.dialect.delimiter, self.dialect.trailing):
+                self._cut_line = block.line + block.lines - 1
+                block, columns = self._without_cut_line(block, columns)
+            self._add(block, columns)
             if len(self.table) > self.limits.points:
                 what = f"more points than the limit points = {self.limits.points}; raise it"
                 raise FormatError(self.path, what, line=self.table.line(self.limits.points))
@@ -132,6 +139,8 @@ class RowReader:
             message = f"{self._dropped} rows that are not like the others were dropped"
             where = f"{self.path}, line {self._first_dropped}"
             found.append(Finding(Code.ROWS_DROPPED, Level.WARN, message, where))
+        if self._cut_line:
+            found.append(last_line_cut(self.path, self._cut_line, recover=self.recover))
         if self._wrong_counts:
             line, message = self._wrong_counts[0]
             others = f" (and {len(self._wrong_counts) - 1} more)" if len(self._wrong_counts) > 1 else ""
@@ -139,12 +148,12 @@ class RowReader:
             found.append(Finding(Code.COUNT_REPLACED, Level.WARN, message, f"{self.path}, line {line}"))
         return tuple(found)
 
-    def _parsed(self, stream: TextStream) -> Iterator[tuple[Block, FloatArray | None]]:
+    def _parsed(self, stream: TextStream) -> Iterator[tuple[Block, list[FloatArray] | None]]:
         """Yield the blocks in their order, with their numbers where they leave no doubt; some are parsed ahead."""
-        ahead: deque[tuple[Block, Future[FloatArray | None]]] = deque()
+        ahead: deque[tuple[Block, Future[list[FloatArray] | None]]] = deque()
         failed: FormatError | None = None
         more = True
-        with ThreadPoolExecutor(_BLOCKS_AHEAD) as pool:
+        with ThreadPoolExecutor(_WORKERS) as pool:
             while more or ahead:
                 try:
                     block = stream.take() if more else None
@@ -159,9 +168,19 @@ class RowReader:
         if failed is not None:
             raise failed
 
-    def _add(self, block: Block, values: FloatArray | None) -> None:
-        if values is not None and len(values) == block.lines:
-            self.table.append(values, block.line)
+    def _without_cut_line(
+        self, block: Block, columns: list[FloatArray] | None
+    ) -> tuple[Block, list[FloatArray] | None]:
+        """Return the last block without its last row, if that is to be repaired."""
+        if not self.recover:
+            return block, columns
+        if columns is not None and len(columns[0]) == block.lines:
+            columns = [column[:-1] for column in columns]
+        return Block(block.text[: block.text.rfind(b"\n") + 1], block.line, block.byte, block.lines - 1), columns
+
+    def _add(self, block: Block, columns: list[FloatArray] | None) -> None:
+        if columns is not None and len(columns[0]) == block.lines:
+            self.table.append(columns, block.line)
             return
         batch: list[Row] = []
         try:
@@ -177,16 +196,14 @@ class RowReader:
         finally:  # if the lines end in an error, what is wrong with those before it comes first
             self._add_rows(batch)
 
-    def _quick(self, text: bytes) -> FloatArray | None:
+    def _quick(self, text: bytes) -> list[FloatArray] | None:
         if self._has_long_line(text):
             return None
         if self.dialect.trailing and self.dialect.delimiter:
             last = self.dialect.delimiter.encode("ascii")
             text = text.replace(b"\r\n", b"\n").replace(last + b"\n", b"\n").removesuffix(last)
-        values = quick_numbers(text, self.width, delimiter=self.dialect.delimiter, decimal=self.dialect.mark)
-        if values is None or len(self.used) == self.width:
-            return values
-        return values[:, self.used]
+        columns = quick_columns(text, self.width, delimiter=self.dialect.delimiter, decimal=self.dialect.mark)
+        return None if columns is None else [columns[column] for column in self.used]
 
     def _has_long_line(self, text: bytes) -> bool:
         # A line beyond the limit covers at least one whole window of half the limit.
@@ -206,7 +223,7 @@ class RowReader:
             self._first_dropped = self._first_dropped or min(bad)
             self._dropped += len(bad)
             values, lines = self._numbers(good)
-        self.table.append(values, lines)
+        self.table.append(values.T, lines)
 
     def _numbers(self, batch: list[Row]) -> tuple[FloatArray, IntArray]:
         rows = batch if self.dialect.is_plain else [(row[0], self.dialect.plain(self.path, row)) for row in batch]

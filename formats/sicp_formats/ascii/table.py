@@ -9,14 +9,17 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
+from threading import Lock
 
 import numpy as np
 
 from sicp_cam.model import BoolArray, FloatArray, IntArray
+from sicp_formats.surfaces.point_rows import PointNames
+from sicp_formats.surfaces.row_blocks import BLOCK_ROWS, RowBlocks, Scalars
 
-__all__ = ["Table"]
+__all__ = ["Table", "places"]
 
-_PIECE_BYTES = 2**26  # larger than any allocator keeps for itself
+_PIECE_BYTES = 5 * 2**23  # larger than any allocator keeps for itself
 _FIRST_ROWS = 1000
 
 
@@ -40,20 +43,29 @@ class Table:
     def __len__(self) -> int:
         return self._rows
 
-    def append(self, values: FloatArray, lines: int | IntArray) -> None:
-        """Add rows, and their lines: those of each row, or the first where each row is the next line."""
+    def append(self, columns: Sequence[FloatArray] | FloatArray, lines: int | IntArray) -> None:
+        """Add rows, and their lines.
+
+        Parameters
+        ----------
+        columns
+            (width, n) numbers: those of each column together, as the parser leaves them.
+        lines
+            (n,) lines of the rows, or that of the first where each row is the next line.
+        """
         self._starts.append(self._rows)
         self._lines.append(lines)
-        self._rows += len(values)
-        while len(values):
+        done, rows = 0, len(columns[0])
+        self._rows += rows
+        while done < rows:
             if not self._free:
                 self._free = max(1, _PIECE_BYTES // (8 * self.width))
                 self._pieces.append(np.empty((self._free, self.width), order="F"))
             piece = self._pieces[-1]
-            count = min(self._free, len(values))
-            begin = len(piece) - self._free
-            piece[begin : begin + count] = values[:count]  # both by columns, as the parser leaves them
-            values = values[count:]
+            begin, count = len(piece) - self._free, min(self._free, rows - done)
+            for place, column in enumerate(columns):
+                piece[begin : begin + count, place] = column[done : done + count]
+            done += count
             self._free -= count
 
     def line(self, row: int) -> int:
@@ -79,20 +91,50 @@ class Table:
         passed = sum(int(np.count_nonzero(test(piece[:, columns]))) for piece in self.pieces())
         return passed / max(1, self._rows)
 
-    def empty_into(self, groups: Sequence[int | Sequence[int]]) -> list[FloatArray]:
-        """Move columns into arrays of their own: (n,) for one, (n, k) for a group; the table is empty afterwards."""
-        shapes = [(self._rows,) if isinstance(group, int) else (self._rows, len(group)) for group in groups]
-        found = [np.empty(shape) for shape in shapes]
-        begin = 0
-        self._pieces.reverse()
-        while self._pieces:
-            piece = self._pieces.pop()[: self._rows - begin]
-            for array, group in zip(found, groups, strict=True):
-                target = array[begin : begin + len(piece)]
-                if isinstance(group, int):
-                    target[:] = piece[:, group]
-                else:
-                    for place, column in enumerate(group):
-                        target[:, place] = piece[:, column]
-            begin += len(piece)
-        return found
+    def emptied(self) -> RowBlocks:
+        """Return the rows, their columns named by their number; the table has only the lines afterwards.
+
+        They can be asked for once: a piece is given back as soon as all of its rows have been used.
+        """
+        pieces, self._pieces, self._free = [*self.pieces()], [], 0
+        return _Pieces(pieces)
+
+
+def places(xyz: Sequence[int], normal: Sequence[int], further: Sequence[int]) -> PointNames:
+    """Return columns, of which some may have no normal, as `Table.emptied` names them.
+
+    >>> places((0, 1, 2), (), (3,))
+    PointNames(xyz=('0', '1', '2'), normal=(None, None, None), further=('3',))
+    """
+    return PointNames(tuple(map(str, xyz)), tuple(map(str, normal)) or (None,) * 3, tuple(map(str, further)))
+
+
+class _Pieces:
+    """Rows in pieces, each of them dropped behind its last row."""
+
+    def __init__(self, pieces: list[FloatArray]) -> None:
+        self._pieces: list[FloatArray | None] = [*pieces]
+        self._ends = np.cumsum([0, *map(len, pieces)]).tolist()
+        self._left = [len(piece) for piece in pieces]
+        self._lock = Lock()
+
+    def __len__(self) -> int:
+        return int(self._ends[-1])
+
+    def blocks(self, begin: int, end: int) -> Iterator[Scalars]:
+        """Yield views of the rows from `begin` to `end`."""
+        while begin < end:
+            number = bisect_right(self._ends, begin) - 1
+            piece, first = self._pieces[number], self._ends[number]
+            last = min(end, self._ends[number + 1], begin + BLOCK_ROWS)
+            if piece is not None:
+                yield {str(column): piece[begin - first : last - first, column] for column in range(piece.shape[1])}
+            piece = None
+            self._give_back(number, last - begin)
+            begin = last
+
+    def _give_back(self, number: int, rows: int) -> None:
+        with self._lock:
+            self._left[number] -= rows
+            if not self._left[number]:
+                self._pieces[number] = None

@@ -1,8 +1,8 @@
 """Write scans as tables of text: .asc, .xyz (blanks), .csv (commas), .txt (tabs), and .pts.
 
-A header names the columns and the unit, so that nothing needs to be guessed when the table is read again. Numbers are
-written so that reading gives the same doubles, unless a number of decimals is asked for. Such tables hold points only:
-triangles are not written.
+A header names the columns, and the unit where it is known, so that nothing needs to be guessed when the table is read
+again. Numbers are written so that reading gives the same doubles, unless a number of decimals is asked for. Such tables
+hold points only: triangles are not written.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from sicp_cam.errors import FormatError, JobError, printable
 from sicp_cam.model import FloatArray, Scan
 from sicp_cam.units import mm_per_unit
 from sicp_formats.ascii.columns import named_columns, split_header
+from sicp_formats.source import unit_to_state
 
 __all__ = ["write_csv", "write_pts", "write_scan", "write_txt"]
 
@@ -186,7 +187,9 @@ def _check_decimals(decimals: int | None) -> None:
 
 def _header(scan: Scan, unit: str, between: str) -> str:
     """Return the names of all columns as a line that the reader understands."""
-    names = [f"{axis}_{unit}" for axis in "xyz"] + (["nx", "ny", "nz"] if scan.normals is not None else [])
+    names = [f"{axis}_{unit}" if unit_to_state(scan.source, unit) else axis for axis in "xyz"] + (
+        ["nx", "ny", "nz"] if scan.normals is not None else []
+    )
     names += scan.columns
     line = between.join(name if _SIMPLE.fullmatch(name) else f'"{name}"' for name in names)
     try:

@@ -5,26 +5,28 @@ Runs in the child process only: it works on the CAD kernel's shapes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import islice
+from collections.abc import Sequence
 from typing import Any
 
 from OCP.TopAbs import TopAbs_ShapeEnum
-from OCP.TopoDS import TopoDS_Iterator
 
 from sicp_cam.errors import CadError
 from sicp_cam.findings import Level
 from sicp_formats.cad.faces import Body, bodies, distinct
 from sicp_formats.cad.notes import Code, Notes
-from sicp_formats.cad.sewing import Sewn, compound, sewn
-from sicp_formats.cad.shape import Loaded, Named
+from sicp_formats.cad.overlaps import Overlaps, overlaps
+from sicp_formats.cad.products import products
+from sicp_formats.cad.sewing import Sewn, compound, sewn, without
+from sicp_formats.cad.shape import Loaded
 
 __all__ = ["chosen", "described", "list_bodies", "separated"]
 
-_COMPOUND, _FACE = TopAbs_ShapeEnum.TopAbs_COMPOUND, TopAbs_ShapeEnum.TopAbs_FACE
+_FACE = TopAbs_ShapeEnum.TopAbs_FACE
 _SHELL, _SOLID = TopAbs_ShapeEnum.TopAbs_SHELL, TopAbs_ShapeEnum.TopAbs_SOLID
 MOST_LISTED = 24
 MOST_RANGES = 6
+OVERLAP = 2.0
+"""Faces lie on each other within this many sewing tolerances; edges are sewn that are a little further apart."""
 FINE_GAP_MM = 0.01
 """Seams that are open by more than this are worth a warning."""
 
@@ -32,14 +34,16 @@ FINE_GAP_MM = 0.01
 def separated(loaded: Loaded, sew_mm: float, notes: Notes) -> list[Body]:
     """Return the bodies of a file with their names; what is loose within one product is sewn first."""
     found, seams = [], []
-    for shape, name in _groups(loaded.shape, "", loaded.naming):
-        joined = sewn(shape, sew_mm)
+    for product in products(loaded.shape, loaded.naming):
+        shape, stacked = _thinned(product.shape, sew_mm, notes)
+        joined = sewn(shape, sew_mm, stacked)
         if joined is not None:
             seams.append(joined)
             shape = joined.shape
+            _note_patches(product.patches, notes)
         parts = _parts(shape)
         for part in parts:
-            found += bodies(part, (loaded.naming(part).label if len(parts) > 1 else "") or name)
+            found += bodies(part, (loaded.naming(part).label if len(parts) > 1 else "") or product.name)
     _note_seams(seams, sew_mm, notes)
     return found
 
@@ -91,42 +95,29 @@ def list_bodies(found: Sequence[Body], wanted: Sequence[Body], owners: Sequence[
     notes.add(Code.BODIES, Level.INFO, f"{text}; the path chooses among all, or name one as part.body")
 
 
-def _children(shape: Any) -> Iterator[Any]:
-    if shape.ShapeType() == _COMPOUND:
-        children = TopoDS_Iterator(shape)
-        while children.More():
-            yield children.Value()
-            children.Next()
-
-
-def _groups(shape: Any, name: str, naming: Callable[[Any], Named]) -> list[tuple[Any, str]]:
-    """Split an assembly into its products with their names; what is of one product stays together."""
-    own = naming(shape).product or name
-    inner: list[Any] = []
-    rest: list[Any] = []
-    for child in _children(shape):
-        (inner if _holds_product(child, naming) else rest).append(child)
-    if not inner:
-        return [(shape, own)]
-    split = [group for child in inner for group in _groups(child, own, naming)]
-    return [*split, (compound(rest), own)] if rest else split
-
-
-def _holds_product(shape: Any, naming: Callable[[Any], Named]) -> bool:
-    own = naming(shape).product is not None and not _is_one_face(shape)
-    return own or any(_holds_product(child, naming) for child in _children(shape))
-
-
-def _is_one_face(shape: Any) -> bool:
-    """Say whether a shape is a face by itself: some systems write each face of a skin as a product of its own."""
-    solids = next(distinct(shape, _SOLID), None)
-    return solids is None and len(list(islice(distinct(shape, _FACE), 2))) == 1
-
-
 def _parts(shape: Any) -> list[Any]:
     """Return the solids, the shells outside of them and the faces outside of these, the last as one."""
     alone = list(distinct(shape, _FACE, _SHELL))
     return [*distinct(shape, _SOLID), *distinct(shape, _SHELL, _SOLID), *([compound(alone)] if alone else [])]
+
+
+def _thinned(shape: Any, sew_mm: float, notes: Notes) -> tuple[Any, tuple[Any, ...]]:
+    """Return a shape without copies of its loose faces, and those that lie on others and are not to be sewn."""
+    faces = list(distinct(shape, _FACE, _SOLID))
+    doubled = overlaps(faces, OVERLAP * sew_mm) if len(faces) > 1 else Overlaps((), ())
+    if doubled.copies:
+        line = f"{len(doubled.copies)} of {len(faces)} loose faces are there twice; the copies are left out"
+        notes.add(Code.FACE_DOUBLED, Level.WARN, f"{line}, and with them the side that they state as outward")
+    if doubled.stacked and sew_mm > 0.0:
+        line = f"{len(doubled.stacked)} of {len(faces)} loose faces lie on each other, within {OVERLAP * sew_mm:g} mm"
+        notes.add(Code.FACES_OVERLAP, Level.WARN, f"{line}; they are not sewn, each has contours of its own")
+    return without(shape, doubled.copies), doubled.stacked
+
+
+def _note_patches(patches: int, notes: Notes) -> None:
+    if patches:
+        line = f"{patches} products of one face each, which have no names of their own, are sewn as patches of one skin"
+        notes.add(Code.PRODUCTS_SEWN, Level.WARN, f"{line}; if they are parts of their own, set part.sew_mm=0")
 
 
 def _note_seams(seams: list[Sewn], sew_mm: float, notes: Notes) -> None:

@@ -42,7 +42,7 @@ def read_part(
     path
         The file, in the text form of 80 columns.
     units
-        The unit of a file that states none; the file's own unit is an error to contradict.
+        The unit of a file that states none, or two that differ; the file's own unit is an error to contradict.
     limits
         `cad_seconds` and `child_memory_bytes` bound the CAD kernel.
     recover
@@ -59,7 +59,8 @@ def read_part(
     FormatError
         If the bytes are not a whole IGES file.
     UnitError
-        If `units` is unknown, or not the unit that the file states.
+        If `units` is unknown, or not the unit that the file states; or left out, and the file states none that can
+        be read, or two that differ.
     JobError
         If `sew_mm` is no tolerance.
     CadError

@@ -11,15 +11,22 @@ from typing import Any
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.IGESControl import IGESControl_Controller, IGESControl_Reader
 
-from sicp_cam.errors import CadError
+from sicp_cam.errors import CadError, UnitError
 from sicp_cam.findings import Level
+from sicp_cam.units import MM_PER_UNIT
 from sicp_formats.cad.notes import Code, Notes
-from sicp_formats.cad.shape import Loaded, Order, check_extent, failures, in_mm, one_unit
+from sicp_formats.cad.shape import UNIT_UNREADABLE, Loaded, Order, check_extent, failures, in_mm, one_unit
 
 __all__ = ["load"]
 
 _UNIT_NAMES = {1: "inch", 2: "mm", 4: "ft", 5: "mile", 6: "m", 7: "km", 8: "mil", 9: "um", 10: "cm", 11: "microinch"}
-_BY_NAME = {"IN": "inch", "INCH": "inch", "MM": "mm", "M": "m", "CM": "cm"}
+_BY_NAME = (
+    dict.fromkeys(("IN", "INCH", "INCHES"), "inch")
+    | dict.fromkeys(("MM", "MILLIMETER", "MILLIMETRE", "MILLIMETERS", "MILLIMETRES"), "mm")
+    | dict.fromkeys(("CM", "CENTIMETER", "CENTIMETRE"), "cm")
+    | dict.fromkeys(("M", "METER", "METRE", "METERS", "METRES"), "m")
+    | {"FT": "ft", "FEET": "ft", "MI": "mile", "KM": "km", "MIL": "mil", "UM": "um", "UIN": "microinch"}
+)
 _BY_NAME_ONLY = 3
 _SHAPE = re.compile(r"IGES(Geom|Solid)_")
 _REMEDY = "export it again, or repair it with --recover"
@@ -32,7 +39,7 @@ def load(order: Order, notes: Notes) -> Loaded:
     if reader.ReadFile(str(order.file)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise CadError("the CAD kernel cannot read it; export it again")
     model = reader.IGESModel()
-    unit, stated = one_unit(_unit(model.GlobalSection()), order.units, notes)
+    unit, read_as = _unit(model.GlobalSection(), order, notes)
     if reader.NbRootsForTransfer() == 0:
         raise CadError("holds no shapes; export the solid or its faces")
     _refuse_half_read(reader, model, order.recover, notes)
@@ -41,20 +48,37 @@ def load(order: Order, notes: Notes) -> Loaded:
     shape = reader.OneShape()
     if shape is None or shape.IsNull():
         raise CadError("holds no shapes that the CAD kernel can build; export the solid or its faces")
-    if order.units is not None and not stated:
-        shape, unit, stated = in_mm(shape, order.units), order.units, True
+    if unit != read_as:
+        shape = in_mm(shape, unit, read_as)
     check_extent(shape, order.coordinate_mm)
-    return Loaded(shape, unit, stated)
+    return Loaded(shape, unit, True)
 
 
-def _unit(section: Any) -> list[str]:
-    """Return the unit of the global section; the kernel brings it to mm by itself."""
-    flag = int(section.UnitFlag())
-    if flag != _BY_NAME_ONLY:
-        return [_UNIT_NAMES[flag]] if flag in _UNIT_NAMES else []
-    name = section.UnitName()
-    text = name.ToCString().strip().upper() if name is not None else ""
-    return [_BY_NAME.get(text, text.lower())] if text else []
+def _unit(section: Any, order: Order, notes: Notes) -> tuple[str, str]:
+    """Return the unit of the file's numbers, and the one by which the kernel brings them to mm.
+
+    Raises
+    ------
+    UnitError
+        If the file's unit cannot be read or its flag and its name contradict each other, and the user does not say
+        which it is; or if the user states another one than the file.
+    """
+    flag, text = int(section.UnitFlag()), section.UnitName()
+    name = _BY_NAME.get(text.ToCString().strip().upper(), "") if text is not None else ""
+    # By name alone: a flag that is still 3 is one of which the kernel does not know the name, and it goes on with mm.
+    by_flag = name if flag == _BY_NAME_ONLY and name == "mm" else _UNIT_NAMES.get(flag, "")
+    if not by_flag:
+        if order.units is None:
+            raise UnitError(UNIT_UNREADABLE)
+        return order.units, "mm"
+    if name and name != by_flag:
+        if order.units == name and by_flag in MM_PER_UNIT:
+            return name, by_flag
+        if order.units != by_flag:
+            both = f"the unit flag {flag} says {by_flag}, the unit name says {name}"
+            raise UnitError(f"{both}; state which it is with --cad-units")
+    unit, _ = one_unit([by_flag], order.units, notes)
+    return unit, unit
 
 
 def _refuse_half_read(reader: Any, model: Any, recover: bool, notes: Notes) -> None:

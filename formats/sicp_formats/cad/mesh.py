@@ -30,6 +30,8 @@ ANGULAR_RAD = 0.3
 LARGEST_SAG_MM = 0.5
 MOST_TRIANGLES = 60_000
 """The mesh is not refined where it would get many more triangles than this."""
+LEAST_GAIN, PATIENCE = 0.9, 4
+"""Nor where making it finer so many times has left more than this share of the sag."""
 SAG_SAMPLES = 200
 SAME_VERTEX_MM = 1e-6
 
@@ -62,6 +64,7 @@ def tessellate(shape: Any, bodies: list[Body]) -> tuple[list[list[FaceMesh | Non
     A face that the kernel cannot tessellate has None.
     """
     angular = ANGULAR_RAD
+    sags = [np.inf] * PATIENCE
     while True:
         BRepMesh_IncrementalMesh(shape, LINEAR_MM, False, angular, False)
         meshes = [[_face_mesh(face) for face in body.faces] for body in bodies]
@@ -76,9 +79,12 @@ def tessellate(shape: Any, bodies: list[Body]) -> tuple[list[list[FaceMesh | Non
         )
         finer = angular * np.sqrt(0.7 * LARGEST_SAG_MM / max(sag, 1e-12))
         triangles = sum(len(mesh.triangles) for row in meshes for mesh in row if mesh)
-        if sag <= LARGEST_SAG_MM or triangles * angular / finer > MOST_TRIANGLES:
+        # On a damaged face the sag stays, however fine the mesh.
+        hopeless = sag > LEAST_GAIN * sags[-PATIENCE] or triangles * angular / finer > MOST_TRIANGLES
+        if sag <= LARGEST_SAG_MM or hopeless:
             return meshes, sag
         angular = float(finer)
+        sags.append(sag)
         BRepTools.Clean_s(shape)
 
 

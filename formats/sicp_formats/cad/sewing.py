@@ -5,13 +5,14 @@ Runs in the child process only: it imports the CAD kernel.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
 from OCP.BRepGProp import BRepGProp
+from OCP.BRepTools import BRepTools_ReShape
 from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp
@@ -20,7 +21,7 @@ from OCP.TopTools import TopTools_IndexedDataMapOfShapeListOfShape
 
 from sicp_formats.cad.faces import distinct
 
-__all__ = ["Sewn", "compound", "sewn"]
+__all__ = ["Sewn", "compound", "sewn", "without"]
 
 _EDGE, _FACE = TopAbs_ShapeEnum.TopAbs_EDGE, TopAbs_ShapeEnum.TopAbs_FACE
 _SHELL, _SOLID = TopAbs_ShapeEnum.TopAbs_SHELL, TopAbs_ShapeEnum.TopAbs_SOLID
@@ -49,9 +50,14 @@ class Sewn:
     faces: int
 
 
-def sewn(shape: Any, tolerance_mm: float) -> Sewn | None:
-    """Sew the faces and shells of a shape that are in no solid; None if no two of them touch."""
-    loose = [*distinct(shape, _SHELL, _SOLID), *distinct(shape, _FACE, _SHELL)]
+def sewn(shape: Any, tolerance_mm: float, left: Sequence[Any] = ()) -> Sewn | None:
+    """Sew the faces and shells of a shape that are in no solid, but those that hold a face that is to be left.
+
+    None if no two of them touch.
+    """
+    outside = [*distinct(shape, _SHELL, _SOLID), *distinct(shape, _FACE, _SHELL)]
+    aside = [each for each in outside if any(face.IsSame(one) for face in distinct(each, _FACE) for one in left)]
+    loose = [each for each in outside if not any(each is one for one in aside)]
     if len(loose) < 2 or not tolerance_mm > 0.0:
         return None
     before = compound(loose)
@@ -67,7 +73,7 @@ def sewn(shape: Any, tolerance_mm: float) -> Sewn | None:
         return None
     shells, turned = _agreeing(after, sewing, list(distinct(before, _FACE)))
     alone = distinct(after, _FACE, _SHELL)
-    whole = compound([*distinct(shape, _SOLID), *shells, *alone])
+    whole = compound([*distinct(shape, _SOLID), *shells, *alone, *aside])
     faces = sum(1 for _ in distinct(before, _FACE))
     gap = max((BRep_Tool.Tolerance_s(TopoDS.Edge_s(edge)) for edge in common), default=0.0)
     return Sewn(whole, len(common) - len(known), gap, turned, faces)
@@ -80,6 +86,16 @@ def compound(shapes: Iterable[Any]) -> Any:
     for shape in shapes:
         builder.Add(whole, shape)
     return whole
+
+
+def without(shape: Any, faces: Sequence[Any]) -> Any:
+    """Return a shape without some of its faces."""
+    if not faces:
+        return shape
+    change = BRepTools_ReShape()
+    for face in faces:
+        change.Remove(face)
+    return change.Apply(shape)
 
 
 def _common_edges(shape: Any) -> list[Any]:

@@ -17,6 +17,8 @@ from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
 from OCP.gp import gp_Pnt, gp_Trsf
 from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopoDS import TopoDS_Iterator
+from OCP.TopTools import TopTools_IndexedMapOfShape
 
 from sicp_cam.errors import CadError, UnitError
 from sicp_cam.findings import Level
@@ -25,6 +27,7 @@ from sicp_formats.cad.faces import explored
 from sicp_formats.cad.notes import Code, Notes
 
 __all__ = [
+    "UNIT_UNREADABLE",
     "Loaded",
     "Named",
     "Order",
@@ -32,11 +35,13 @@ __all__ = [
     "failures",
     "in_mm",
     "nameless",
+    "names_of_copy",
     "nothing_in",
     "one_unit",
     "syntax_error",
 ]
 
+UNIT_UNREADABLE = "the unit of length cannot be read; state it with --cad-units"
 SMALLEST_MM, LARGEST_MM = 1e-3, 1e5
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _SYNTAX = re.compile(r"^ERR StepFile\s*:\s*")
@@ -110,11 +115,36 @@ def one_unit(names: list[str], wanted: str | None, notes: Notes) -> tuple[str, b
     return "+".join(names), True
 
 
-def in_mm(shape: Any, unit: str) -> Any:
-    """Return a shape of which the numbers are in another unit scaled to mm."""
+def in_mm(shape: Any, unit: str, read_as: str = "mm") -> Any:
+    """Return a shape of which the numbers are in `unit` in mm, where the kernel has taken them for `read_as`."""
     scaling = gp_Trsf()
-    scaling.SetScale(gp_Pnt(0.0, 0.0, 0.0), MM_PER_UNIT[unit])
+    scaling.SetScale(gp_Pnt(0.0, 0.0, 0.0), MM_PER_UNIT[unit] / MM_PER_UNIT[read_as])
     return BRepBuilderAPI_Transform(shape, scaling, True).Shape()
+
+
+def names_of_copy(original: Any, copy: Any, naming: Callable[[Any], Named]) -> Callable[[Any], Named]:
+    """Return what tells of the parts of a copy what `naming` tells of those of its original."""
+    pairs, place = [(copy, original)], TopTools_IndexedMapOfShape()
+    originals: list[Any] = []
+    for copied, part in pairs:  # grows as it goes, down to the faces
+        if place.Add(copied) > len(originals):
+            originals.append(part)
+        if part.ShapeType() != TopAbs_ShapeEnum.TopAbs_FACE:
+            pairs += zip(_parts(copied), _parts(part), strict=True)
+
+    def of_copy(shape: Any) -> Named:
+        index = place.FindIndex(shape)
+        return naming(originals[index - 1]) if index else Named()
+
+    return of_copy
+
+
+def _parts(shape: Any) -> list[Any]:
+    found, parts = [], TopoDS_Iterator(shape)
+    while parts.More():
+        found.append(parts.Value())
+        parts.Next()
+    return found
 
 
 def check_extent(shape: Any, coordinate_mm: float) -> None:

@@ -55,11 +55,13 @@ def read_part(
     error of at most 0.002 mm and a turn of at most 5 degrees each. Stability points lie 10 and 30 mm inside the
     material, where the same skin reaches so far.
 
-    Faces and shells of one product that belong to no solid and only touch are sewn, so that they make one skin. A file
+    Faces and shells of one product that belong to no solid and only touch are sewn, so that they make one skin;
+    products stay apart. Of products of one face each that have no name of their own it cannot be told: they are sewn,
+    with a finding. Of faces that are there twice one is read, and faces that lie on each other are not sewn. A file
     that holds triangles only gives a mesh and no contours.
 
     Edges that leave their surface or miss each other by more than 0.5 mm are refused, by more than 0.05 mm a finding.
-    Findings 201-216 and, of repairs, 250-254 are named in `sicp_formats.cad.notes.Code`.
+    Findings 201-219 and, of repairs, 250-254 are named in `sicp_formats.cad.notes.Code`.
 
     Parameters
     ----------
@@ -84,7 +86,8 @@ def read_part(
     FormatError
         If the bytes are not a whole STEP file, or its parts are in other files.
     UnitError
-        If `units` is unknown, or not the unit that the file states.
+        If `units` is unknown, or not the unit that the file states; or left out, and the file's unit is missing or
+        not understood.
     JobError
         If `sew_mm` is no tolerance.
     CadError

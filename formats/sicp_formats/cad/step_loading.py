@@ -9,13 +9,13 @@ Runs in the child process only: it imports the CAD kernel.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from OCP.IFSelect import IFSelect_ReturnStatus
 from OCP.Standard import Standard_OutOfRange
 from OCP.STEPControl import STEPControl_Reader
-from OCP.TColStd import TColStd_SequenceOfAsciiString
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopTools import TopTools_IndexedMapOfShape
@@ -24,21 +24,20 @@ from sicp_cam.errors import CadError
 from sicp_cam.findings import Level
 from sicp_formats.cad.faces import explored
 from sicp_formats.cad.notes import Code, Notes
-from sicp_formats.cad.shape import Loaded, Named, Order, check_extent, failures, in_mm, nameless, one_unit, syntax_error
+from sicp_formats.cad.shape import Loaded, Named, Order, check_extent, failures, in_mm, names_of_copy, syntax_error
+from sicp_formats.cad.step_units import length_unit
 
 __all__ = ["check_faces", "load"]
 
-_ANY, _FACE = TopAbs_ShapeEnum.TopAbs_SHAPE, TopAbs_ShapeEnum.TopAbs_FACE
-_SHELL, _SOLID = TopAbs_ShapeEnum.TopAbs_SHELL, TopAbs_ShapeEnum.TopAbs_SOLID
-_UNIT_NAMES = (
-    {"millimetre": "mm", "millimeter": "mm", "centimetre": "cm", "centimeter": "cm"}
-    | dict.fromkeys(("metre", "meter"), "m")
-    | dict.fromkeys(("inch", "inches", "in"), "inch")
-)
+_FACE = TopAbs_ShapeEnum.TopAbs_FACE
 _TOPOLOGY = re.compile(r"StepShape_\w*(Face|Edge|Loop|Vertex|Shell|Brep)")
 _FACE_ENTITY = re.compile(rb"=\s*(?:ADVANCED_FACE|FACE_SURFACE)\s*\(")
 _INSTANCE, _PRODUCT = "StepRepr_NextAssemblyUsageOccurrence", "StepBasic_ProductDefinition"
 _LABELLED = ("StepShape_ManifoldSolidBrep", "StepShape_BrepWithVoids", "StepShape_ShellBasedSurfaceModel")
+_MADE_UP = re.compile(
+    r"open cascade .*|=>.*|(?:(?:open[ _]?)?shell|face|surface|compound|none|unnamed|untitled)?[ _.:#-]*[\d.]*",
+    re.IGNORECASE,
+)
 _ANY_RESULT = -1
 _REMEDY = "export it again, or repair it with --recover"
 
@@ -58,7 +57,7 @@ def load(order: Order, notes: Notes) -> Loaded:
     CadError
         If the file cannot be read whole, holds no shape, or the shape has no sensible extent.
     UnitError
-        If the file states another unit than the user.
+        If the unit of length cannot be read and the user states none, or states another one than the file.
     """
     reader = STEPControl_Reader()
     if reader.ReadFile(str(order.file)) != IFSelect_ReturnStatus.IFSelect_RetDone:
@@ -67,14 +66,15 @@ def load(order: Order, notes: Notes) -> Loaded:
     if reader.NbRootsForTransfer() == 0:
         raise CadError("holds no shapes; export the solid or its faces")
     _refuse_half_read(reader, order, notes)
-    unit, stated = one_unit(_units(reader), order.units, notes)
-    _transfer(reader, order.recover, notes)
+    unit, stated = length_unit(reader, order, notes)
+    roots = _transfer(reader, order.recover, notes)
     shape = reader.OneShape()
     if shape is None or shape.IsNull():
         raise CadError("holds no shapes that the CAD kernel can build; export the solid or its faces")
-    naming = partial(_named, reader) if _several(shape) else nameless
+    naming: Callable[[Any], Named] = partial(_named, reader, roots)
     if order.units is not None and not stated:
-        shape, naming = in_mm(shape, order.units), nameless
+        read, shape = shape, in_mm(shape, order.units)
+        naming = names_of_copy(read, shape, naming)
         unit, stated = order.units, True
     check_extent(shape, order.coordinate_mm)
     return Loaded(shape, unit, stated, naming)
@@ -111,18 +111,16 @@ def _refuse_half_read(reader: Any, order: Order, notes: Notes) -> None:
             notes.add(Code.NOT_UNDERSTOOD, Level.INFO, f"the CAD kernel did not understand {line}")
 
 
-def _units(reader: Any) -> list[str]:
-    """Return the length units that the file states; the kernel brings them to mm by itself."""
-    lengths, angles, solid_angles = (TColStd_SequenceOfAsciiString() for _ in range(3))
-    reader.FileUnits(lengths, angles, solid_angles)
-    raw = [lengths.Value(i).ToCString().strip().lower() for i in range(1, lengths.Length() + 1)]
-    return sorted({_UNIT_NAMES.get(name, name) for name in raw if name})
-
-
-def _transfer(reader: Any, recover: bool, notes: Notes) -> None:
-    roots = reader.NbRootsForTransfer()
+def _transfer(reader: Any, recover: bool, notes: Notes) -> list[tuple[Any, str]]:
+    """Build all shapes; return those that are products and in no assembly, with their names."""
+    roots, products = reader.NbRootsForTransfer(), []
     for root in range(1, roots + 1):
+        known = reader.NbShapes()
         built = reader.TransferRoot(root)
+        entity = reader.RootForTransfer(root)
+        if entity.DynamicType().Name() == _PRODUCT:
+            name = _product_name(entity)
+            products += [(reader.Shape(i), name) for i in range(known + 1, reader.NbShapes() + 1)]
         problems = dict.fromkeys(
             line for _, lines in failures(reader.WS().TransferReader().LastCheckList()) for line in lines
         )
@@ -132,16 +130,13 @@ def _transfer(reader: Any, recover: bool, notes: Notes) -> None:
         if not recover:
             raise CadError(f"cannot be turned into a shape {what}; {_REMEDY}")
         notes.add(Code.SHAPE_LEFT_OUT, Level.WARN, f"what cannot be turned into a shape is left out {what}")
+    return products
 
 
-def _several(shape: Any) -> bool:
-    kinds = (_SOLID, _ANY), (_SHELL, _SOLID), (_FACE, _SHELL)
-    return sum(1 for kind, outside in kinds for _ in explored(shape, kind, outside)) > 1
-
-
-def _named(reader: Any, shape: Any) -> Named:
-    """Return what the file calls a shape: as a part of an assembly, and as a solid or surface."""
-    product, label = None, ""
+def _named(reader: Any, roots: list[tuple[Any, str]], shape: Any) -> Named:
+    """Return what the file calls a shape: as a product, and as a solid or surface."""
+    # The kernel forgets of which product a root is that has but one shape.
+    product, label = next((name for root, name in roots if root.IsSame(shape)), None), ""
     for placed in (shape, shape.Located(TopLoc_Location())):
         try:
             entity = reader.WS().TransferReader().EntityFromShapeResult(placed, _ANY_RESULT)
@@ -149,12 +144,18 @@ def _named(reader: Any, shape: Any) -> Named:
             continue
         kind = entity.DynamicType().Name() if entity is not None else ""
         if kind == _INSTANCE and product is None:
-            product = _text(entity.RelatedProductDefinition().Formation().OfProduct())
+            product = _product_name(entity.RelatedProductDefinition())
         elif kind == _PRODUCT and product is None:
-            product = _text(entity.Formation().OfProduct())
+            product = _product_name(entity)
         elif kind in _LABELLED:
             label = _text(entity)
     return Named(product, label)
+
+
+def _product_name(definition: Any) -> str:
+    """Return the name of a product as its author gave it; empty if the exporter made it up."""
+    name = _text(definition.Formation().OfProduct())
+    return "" if _MADE_UP.fullmatch(name) else name
 
 
 def _text(entity: Any) -> str:

@@ -1,12 +1,13 @@
 """Read tool paths from DXF drawings: curves joined to chains and loops, each a cut after a rapid move to its begin.
 
-A drawing knows neither tool axis nor feeds, nor how the tool comes to a curve: the rapid moves between chains are
-straight, whatever lies in their way.
+A drawing knows neither tool axis nor feeds, nor how the tool comes to a curve. Unless a clearance is stated, the rapid
+moves between chains are straight, whatever lies in their way.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -55,6 +56,7 @@ def read_path(
     order: Literal["file", "nearest"] = "file",
     direction: Direction = "file",
     start_mm: tuple[float, float, float] | None = None,
+    clearance_mm: float | None = None,
 ) -> ToolPath:
     """Read a DXF drawing (R12 to R2018, text or binary) into a path in mm, with one tool axis.
 
@@ -88,6 +90,9 @@ def read_path(
         the ``file``. Open chains keep theirs.
     start_mm
         Closed chains begin at their point nearest to this one; with ``nearest`` the first chain is the one near it.
+    clearance_mm
+        How far above the highest point of all chains, along the tool axis, the rapid moves run; from there the tool
+        goes down to each chain with the feed of the path, and up again behind it. Without it nothing is lifted.
 
     Raises
     ------
@@ -99,7 +104,7 @@ def read_path(
         If another option is not valid.
     """
     check_options(feed_mm_min=feed_mm_min, chord_mm=chord_mm, step_mm=step_mm)
-    _check_choices(gap_mm, axis, order, direction)
+    _check_choices(gap_mm, axis, order, direction, clearance_mm)
     start = None if start_mm is None else np.array(start_mm, dtype=np.float64)
     content = read_bytes(path, limits)
     moves = MoveList(path, limits, units, chord_mm, step_mm)
@@ -110,16 +115,41 @@ def read_path(
     chains = [directed(chain, direction, np.array(tool_axis), start) for chain in _chains(moves, strands, gap_mm)]
     if axis is None:
         moves.note(Notice.AXIS_ASSUMED, 0)
+    lift = _Lift.above(chains, tool_axis, clearance_mm)
     for chain in _in_order(path, chains, order, start):
-        _append(moves, chain, tool_axis)
+        _append(moves, chain, tool_axis, lift)
     return moves.build(content, format="DXF", feed_mm_min=feed_mm_min)
 
 
-def _check_choices(gap_mm: float, axis: Vector | None, order: str, direction: str) -> None:
+@dataclass(frozen=True, slots=True)
+class _Lift:
+    """How the tool clears the part between chains: along the unit axis, up to a height (mm) measured along it."""
+
+    axis: FloatArray
+    height_mm: float
+
+    @classmethod
+    def above(cls, chains: list[Strand], axis: Vector, clearance_mm: float | None) -> _Lift | None:
+        """Return the lift to a clearance above the highest point of all chains; None without a clearance."""
+        if clearance_mm is None or not chains:
+            return None
+        up = np.array(axis) / np.abs(axis).max()
+        up /= np.linalg.norm(up)
+        return cls(up, max(float((chain.points @ up).max()) for chain in chains) + clearance_mm)
+
+    def over(self, point: FloatArray) -> Vector:
+        """Return the place at the height of the lift that lies over a point (3,)."""
+        x, y, z = (point + (self.height_mm - point @ self.axis) * self.axis).tolist()
+        return (x, y, z)
+
+
+def _check_choices(gap_mm: float, axis: Vector | None, order: str, direction: str, clearance_mm: float | None) -> None:
     """Refuse options out of their range, all at once, with a JobError."""
     problems = []
     if not (math.isfinite(gap_mm) and gap_mm >= 0.0):
         problems.append(f"path.gap_mm = {gap_mm} must be 0 or a positive number")
+    if clearance_mm is not None and not (math.isfinite(clearance_mm) and clearance_mm > 0.0):
+        problems.append(f"path.clearance_mm = {clearance_mm} must be a positive number")
     if axis is not None and not (all(map(math.isfinite, axis)) and any(axis)):
         problems.append(f"path.axis = {axis} must be a direction")
     for key, value, choices in (("order", order, _ORDERS), ("direction", direction, get_args(Direction))):
@@ -158,9 +188,16 @@ def _in_order(path: Path, chains: list[Strand], order: str, start: FloatArray | 
     return in_nearest_order(chains, start)
 
 
-def _append(moves: MoveList, chain: Strand, axis: Vector) -> None:
-    """Append a rapid move to the begin of a chain, and the cuts along it."""
+def _append(moves: MoveList, chain: Strand, axis: Vector, lift: _Lift | None) -> None:
+    """Append a rapid move to the begin of a chain or over it, the cuts along it, and the retract over its end."""
+    first, last = int(chain.lines[0]), int(chain.lines[-1])
+    if lift is None:
+        moves.note(Notice.NO_RETRACT, first)
+    else:
+        moves.move(lift.over(chain.points[0]), axis, 0.0, True, first)
     x, y, z = chain.points[0].tolist()
-    moves.move((x, y, z), axis, 0.0, True, int(chain.lines[0]))
+    moves.move((x, y, z), axis, 0.0, lift is None, first)
     for (x, y, z), line in zip(chain.points[1:].tolist(), chain.lines.tolist(), strict=True):
         moves.move((x, y, z), axis, 0.0, False, line)
+    if lift is not None:
+        moves.move(lift.over(chain.points[-1]), axis, 0.0, True, last)

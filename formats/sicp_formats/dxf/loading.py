@@ -84,7 +84,7 @@ def load(path: Path, content: bytes, tally: Tally, *, recover: bool) -> tuple[An
     binary = content.startswith(_BINARY)
     content = content.removeprefix(_BOM)
     with guarded(path, "the drawing"):
-        tags = _binary_tags(path, content) if binary else ascii_tags(path, content, recover=recover)
+        tags = _binary_tags(path, content) if binary else ascii_tags(path, content)
         _check_size(path, tags, tally)
         _check_structure(tags, tally, recover=recover)
         _check_values(tags, tally, recover=recover)
@@ -125,7 +125,9 @@ def _check_size(path: Path, tags: Tags, tally: Tally) -> None:
 
 
 def _check_structure(tags: Tags, tally: Tally, *, recover: bool) -> None:
-    for what, tag in tags.flaws():
+    for what, tag, loses_curves in tags.flaws():
+        if loses_curves:  # what is left of the last curve would be drawn to the origin
+            raise tags.error(f"{what} within its curves; export it again", tag)
         if not recover:
             raise tags.error(f"{what}; export it again, or repair it with --recover", tag)
         tally.note(Notice.DRAWING_REPAIRED, tags.line(tag), what)
@@ -188,7 +190,10 @@ def _document(path: Path, content: bytes, tally: Tally, *, binary: bool, recover
             what = error.what.replace(_REPAIR, "it is R12 with entities of later versions: export it as R2000")
             raise FormatError(path, what, line=error.line) from error
         if not recover:
-            raise
+            if _is_curable(path, content):
+                raise
+            what = error.what.replace(_REPAIR, "it cannot be repaired either: export it again")
+            raise FormatError(path, what, line=error.line) from error
         tally.note(Notice.DRAWING_REPAIRED, error.line or 0, error.what.partition(";")[0])
     return _repaired(path, content, tally)
 
@@ -202,6 +207,15 @@ def _loaded(content: bytes, *, binary: bool) -> Any:
         return Drawing.load(binary_tags_loader(content))
     encoding = dxf_stream_info(io.TextIOWrapper(io.BytesIO(content), "utf-8", errors="ignore")).encoding
     return Drawing.read(io.TextIOWrapper(io.BytesIO(content), encoding, errors="surrogateescape"))
+
+
+def _is_curable(path: Path, content: bytes) -> bool:
+    """Say whether a repair would succeed, so that none is offered in vain."""
+    try:
+        _repaired(path, content, Tally())
+    except FormatError:
+        return False
+    return True
 
 
 def _repaired(path: Path, content: bytes, tally: Tally) -> Any:

@@ -95,25 +95,25 @@ class Tags:
                     raise self.error("$INSUNITS is no whole number; save the drawing with a unit", tag + 1) from None
         return None
 
-    def flaws(self) -> Iterator[tuple[str, int]]:
-        """Return where the sections of the drawing are not closed: what is wrong, and the tag."""
+    def flaws(self) -> Iterator[tuple[str, int, bool]]:
+        """Return where the sections of the drawing are not closed: what is wrong, the tag, and if curves are lost."""
         section = ""
         last = len(self.codes) - 1
         for tag in np.flatnonzero(self.codes == 0).tolist():
             name = _word(self.values[tag])
             if name in ("SECTION", "EOF") and section:
-                yield f"the section {printable(section, 40)} has no end (ENDSEC)", tag
+                yield f"the section {printable(section, 40)} has no end (ENDSEC)", tag, False
             if name == "SECTION":
                 section = _word(self.values[tag + 1]) if tag < last else "?"
             elif name == "ENDSEC":
                 section = ""
             elif name == "EOF":
                 return
-        yield "the drawing has no end (EOF), it is cut short", last
+        yield "the drawing has no end (EOF), it is cut short", last, section in _WITH_CURVES
 
 
-def ascii_tags(path: Path, content: bytes, *, recover: bool = False) -> Tags:
-    """Return the tags of a drawing in text form; with `recover` those before a group code that is none.
+def ascii_tags(path: Path, content: bytes) -> Tags:
+    """Return the tags of a drawing in text form.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def ascii_tags(path: Path, content: bytes, *, recover: bool = False) -> Tags:
     try:
         codes = list(map(int, lines[: len(lines) // 2 * 2 : 2]))
     except ValueError:
-        codes = _codes_one_by_one(path, lines, recover=recover)
+        codes = _codes_one_by_one(path, lines)
     return tags_of(path, codes, lines[1 : 2 * len(codes) : 2], text=True)
 
 
@@ -144,19 +144,15 @@ def tags_of(path: Path, codes: list[int], values: Sequence[Value], *, text: bool
     return Tags(path, group, values, _numbers(bare, drawn), records, in_model, text)
 
 
-def _codes_one_by_one(path: Path, lines: list[bytes], *, recover: bool) -> list[int]:
+def _codes_one_by_one(path: Path, lines: list[bytes]) -> list[int]:
     """Return the group codes up to the end mark: what follows it is no part of the drawing and need not be codes."""
     codes: list[int] = []
     for place in range(0, len(lines) - 1, 2):
         try:
             codes.append(int(lines[place]))
         except ValueError:
-            if recover:
-                break
             told = printable(lines[place].decode("latin-1").strip(), 40)
-            what = (
-                f"the group code {told!r} is no whole number; is it a DXF? Export it again, or repair it with --recover"
-            )
+            what = f"the group code {told!r} is no whole number; is it a DXF? Export it again"
             raise FormatError(path, what, line=place + 1) from None
         if codes[-1] == 0 and lines[place + 1].strip() == b"EOF":
             break

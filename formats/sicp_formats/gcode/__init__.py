@@ -12,6 +12,7 @@ from sicp_cam.errors import JobError
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_formats.gcode.axis import ROTARY_CHOICES
+from sicp_formats.gcode.dialect import INTEGERS_CHOICES
 from sicp_formats.gcode.program import GCodeOptions, execute
 from sicp_formats.gcode.rewrite import GCodeOriginal
 from sicp_formats.paths.moves import check_options
@@ -32,6 +33,7 @@ def read_path(
     rotary: str | None = None,
     block_skip: bool = True,
     decimal: str | None = None,
+    integers: str | None = None,
 ) -> ToolPath:
     """Read a G-code program into a path in mm, mm/min and unit axes (tip to holder).
 
@@ -47,10 +49,10 @@ def read_path(
     limits
         Caps on the file and the path.
     recover
-        True to drop a last line that nothing ends, to read on where block numbers go back, and to drop NUL bytes at
-        the end of the file.
+        True to drop a last line that nothing ends if it moves nothing, to read on where block numbers go back, and to
+        drop NUL bytes at the end of the file.
     feed_mm_min
-        Feed for cutting moves that the program gives none.
+        Feed for cutting moves that the program gives none, or one under G70 on a control on which F is not inch/min.
     chord_mm, step_mm
         How far a piece of an arc may lie from it, and how long it may be.
     rotary
@@ -61,6 +63,9 @@ def read_path(
         True to leave out blocks that begin with a slash, False to read them.
     decimal
         Decimal mark, ``.`` or ``,``; by default the comma where all commas of the program can be nothing else.
+    integers
+        What a coordinate without a decimal point counts: ``units``, or ``thousandths`` (0.001 mm or degrees, 0.0001
+        inch) as on controls with least-increment input. By default units, with a finding where that may be wrong.
 
     Raises
     ------
@@ -76,9 +81,20 @@ def read_path(
         raise JobError(f"path.rotary = {rotary!r} must be one of {', '.join(ROTARY_CHOICES)}")
     if decimal not in (None, ".", ","):
         raise JobError(f"path.decimal = {decimal!r} must be . or ,")
+    if integers not in (None, *INTEGERS_CHOICES):
+        raise JobError(f"path.integers = {integers!r} must be one of {', '.join(INTEGERS_CHOICES)}")
     content = read_bytes(path, limits)
     options = GCodeOptions(
-        units, limits, recover, feed_mm_min, chord_mm, step_mm, rotary, block_skip=block_skip, decimal=decimal
+        units,
+        limits,
+        recover,
+        feed_mm_min,
+        chord_mm,
+        step_mm,
+        rotary,
+        block_skip=block_skip,
+        decimal=decimal,
+        integers=integers,
     )
     reader = execute(path, content, options)
     original = GCodeOriginal(path, content, options)

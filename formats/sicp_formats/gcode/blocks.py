@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 
 from sicp_formats.gcode.codes import HOMING, MOTION
+from sicp_formats.gcode.dialect import Dialect
 from sicp_formats.gcode.machine import END_CODES
 from sicp_formats.gcode.orientation import Orientation
 from sicp_formats.gcode.state import LineEdit, Piece, ReadBlock, State
-from sicp_formats.gcode.style import Styles, number_like
+from sicp_formats.gcode.style import Styles
 from sicp_formats.gcode.words import Word
 from sicp_formats.paths.arcs import Vector
 
@@ -31,12 +32,12 @@ class BlockWriter:
     numbers put the tool, rounding included, so that no error adds up.
     """
 
-    def __init__(self, orientation: Orientation, decimal: str) -> None:
+    def __init__(self, orientation: Orientation, dialect: Dialect) -> None:
         self.position: list[float | None] = [None, None, None]
         self.mode: float | None = None
         self.orientation = orientation
-        self._decimal = decimal
-        self._styles = Styles(decimal)
+        self._dialect = dialect
+        self._styles = Styles(dialect.decimal)
         self._blank = " "
 
     def note_style(self, text: str, words: Sequence[Word]) -> None:
@@ -176,7 +177,7 @@ class BlockWriter:
         if abs(base + value - target) < _SAME_MM:
             return base + value
         token = edit.text[word.number_start : word.number_end]
-        text = number_like(token, (target - base) / state.mm, _decimals(state.mm), self._decimal)
+        text = self._dialect.written(token, (target - base) / state.mm, _decimals(state.mm))
         edit.number(word, text)
         return base + float(text.replace(",", ".")) * state.mm
 
@@ -185,7 +186,7 @@ class BlockWriter:
         letter, here = _COORDINATES[axis], self.position[axis]
         base = 0.0 if state.absolute or here is None else here
         style = self._styles.like(letter, *_COORDINATES)
-        text = number_like(style.token, (target - base) / state.mm, _decimals(state.mm), self._decimal)
+        text = self._dialect.written(style.token, (target - base) / state.mm, _decimals(state.mm))
         self.position[axis] = base + float(text.replace(",", ".")) * state.mm
         return f"{letter}{style.between}{text}"
 
@@ -195,14 +196,14 @@ class BlockWriter:
         if word is None or not piece.inverse_time or abs(piece.inverse_time / float(word.number) - 1.0) < _SAME_FEED:
             return
         token = edit.text[word.number_start : word.number_end]
-        edit.number(word, number_like(token, piece.inverse_time, _digits(piece.inverse_time), self._decimal))
+        edit.number(word, self._dialect.written(token, piece.inverse_time, _digits(piece.inverse_time)))
 
     def _added_line(self, block: ReadBlock, piece: Piece) -> str:
         words = [self._further(axis, block.after, piece.tip[axis]) for axis in range(3)]
         words += self.orientation.write(None, block, piece.axis, piece.share, self._styles)
         if piece.inverse_time:
             style = self._styles.like("F")
-            text = number_like(style.token, piece.inverse_time, _digits(piece.inverse_time), self._decimal)
+            text = self._dialect.written(style.token, piece.inverse_time, _digits(piece.inverse_time))
             words.append(f"F{style.between}{text}")
         return f"{'/' if block.text.lstrip().startswith('/') else ''}{self._blank.join(words)}"
 

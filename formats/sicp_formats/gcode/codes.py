@@ -24,6 +24,12 @@ _M_KNOWN = frozenset(
      45.0, 48.0, 49.0, 50.0, 51.0, 52.0, 53.0, 60.0, 68.0, 69.0, 70.0, 83.0, 84.0, 88.0, 89.0, 126.0, 127.0, 128.0,
      129.0, 428.0, 429.0, 430.0}
 )  # fmt: skip
+# The words that codes kept as text take along; M codes may have P or Q, and H and D choose tool offsets anywhere.
+_OWN_WORDS = {
+    5.0: "PQR", 5.1: "PQR", 8.0: "P", 43.4: "PQ", 43.5: "PQ", 54.0: "P", 54.1: "P", 61.1: "P", 62.0: "P", 64.0: "PQ",
+    103.0: "P", 154.0: "P", 187.0: "PE", 234.0: "PQ",
+}  # fmt: skip
+_OWN_WORDS_OF_M = {19.0: "PQR", 66.0: "PELQ"}
 _OTHER_FRAME = "it changes what the coordinates mean; post the path in the frame of the part"
 _REFUSED = {
     **dict.fromkeys((41.0, 41.1, 42.0, 42.1), "cutter radius compensation; post the path of the tool centre"),
@@ -47,6 +53,11 @@ def refuse_codes(block: Block, heidenhain: bool = False) -> None:
             continue
         if code in _REFUSED:
             raise GCodeError(f"G{code:g}: {_REFUSED[code]}")
+        if code in (58.0, 59.0) and any(letter in block.words for letter in "XYZABC"):
+            # Siemens shifts the zero point by these numbers, others go there in the offset that G58, G59 choose.
+            raise GCodeError(
+                f"G{code:g} with coordinates may shift the zero point (Siemens); state it in its own block"
+            )
         if code == 5.0 or code == 5.1:
             _refuse_splines(block, code)
         elif not (code in MOTION or code in UNITS or code in HOMING or code in _MODES or _harmless(code)):
@@ -68,13 +79,20 @@ def one_of(block: Block, codes: frozenset[float] | dict[float, str]) -> float | 
     return found.pop() if found else None
 
 
-def kept_words(block: Block) -> str:
-    """Take the codes that are kept as text, with the words that belong to them, out of a block; return the text."""
+def kept_words(block: Block, *, arc: bool = False) -> str:
+    """Take the codes that are kept as text, with the words that belong to them, out of a block; return the text.
+
+    `arc` says that the block is an arc, which needs its R and P itself.
+
+    >>> block = Block(g=[64.0], words={"P": "0.01", "X": "1", "E": "2"})
+    >>> kept_words(block), block.words
+    ('G64 P0.01', {'X': '1', 'E': '2'})
+    """
     kept = [f"G{code:g}" for code in block.g if _harmless(code) or code in (5.0, 5.1, 51.0)]
     kept += [f"M{code:g}" for code in block.m if code not in _M_OF_MACHINE]
     kept += block.keywords
-    letters = "HDPQER" if kept else "HD"
-    kept += [f"{letter}{block.words.pop(letter)}" for letter in letters if _belongs(block, letter)]
+    letters = _own_words(block).difference("RP" if arc else "")
+    kept += [f"{letter}{block.words.pop(letter)}" for letter in "HDPQERL" if letter in letters & block.words.keys()]
     # S1=, M1=: one of several spindles, of which none is known to be that of the tool.
     numbered = [letter for letter in block.words if letter[0] in "SM" and len(letter) > 1]
     kept += [f"{letter}={block.words.pop(letter)}" for letter in numbered]
@@ -96,9 +114,17 @@ def heidenhain_text(block: Block) -> bool:
     return any(code in _HEIDENHAIN_TEXT for code in block.g)
 
 
-def _belongs(block: Block, letter: str) -> bool:
-    arc = any(code in (2.0, 3.0) for code in block.g)
-    return letter in block.words and not (arc and letter in "RP")
+def _own_words(block: Block) -> set[str]:
+    """Return the letters that codes and commands of a block, and not its motion, may have."""
+    letters = set("HD")
+    for code in block.g:
+        letters.update(_OWN_WORDS.get(code, ""))
+    for code in block.m:
+        if code not in _M_OF_MACHINE:
+            letters.update(_OWN_WORDS_OF_M.get(code, "PQ"))
+    if any(letter in block.words for letter in "XYZABC"):
+        letters.discard("E")  # behind a coordinate it would be an exponent
+    return letters
 
 
 def _harmless(code: float) -> bool:

@@ -19,9 +19,15 @@ _FEED_MODES = {93.0, 94.0, 95.0}
 
 @dataclass(slots=True)
 class Machine:
-    """The modal feed, spindle and tool of one program; `plain_feed_mm_min` is the feed while G94 rules."""
+    """The modal feed, spindle and tool of one program; `plain_feed_mm_min` is the feed while G94 rules.
+
+    `feed_unit_unknown` says that G70 rules on a control on which it does not concern F, `may_lack_feed` that the user
+    has stated a feed for such moves.
+    """
 
     moves: MoveList
+    may_lack_feed: bool = False
+    feed_unit_unknown: bool = False
     feed_mode: float = 94.0
     plain_feed_mm_min: float = 0.0
     _feed: float = 0.0
@@ -51,7 +57,7 @@ class Machine:
 
         The words that are used up are taken out of `block.words`.
         """
-        self._take_feed(block)
+        self._take_feed(block, line)
         self._take_spindle(block, line)
         self._take_tool(block, line)
         for code in (code for code in block.m if code in (7.0, 8.0, 9.0)):
@@ -64,8 +70,10 @@ class Machine:
         """Take a feed in units of the program per minute."""
         self._feed, self.plain_feed_mm_min = feed, feed * self.moves.mm
 
-    def follow_unit(self) -> None:
+    def follow_unit(self, line: int) -> None:
         """Read a feed that was stated before the unit in that unit."""
+        if self.feed_unit_unknown and self._feed and self.feed_mode != 93.0:
+            self._feed = self._feed_put_aside(line)
         self.plain_feed_mm_min = self._feed * self.moves.mm
 
     def stop(self, block: Block, line: int) -> bool:
@@ -75,7 +83,7 @@ class Machine:
                 self.moves.event(EventKind.STOP, line, 0.0, f"M{code:g}")
         return any(code in END_CODES for code in block.m)
 
-    def _take_feed(self, block: Block) -> None:
+    def _take_feed(self, block: Block, line: int) -> None:
         modes = [code for code in block.g if code in _FEED_MODES]
         if len(modes) > 1:
             raise GCodeError("two feed modes on one line; take one out")
@@ -84,7 +92,19 @@ class Machine:
         self._feed_in_block = "F" in block.words and 4.0 not in block.g
         if self._feed_in_block:
             self._feed = _positive(block.words.pop("F"), "F")
+            if self.feed_unit_unknown and self.feed_mode != 93.0:
+                self._feed = self._feed_put_aside(line)
             self.plain_feed_mm_min = self._feed * self.moves.mm
+
+    def _feed_put_aside(self, line: int) -> float:
+        """Return 0, no feed, where it is not known in what unit a feed is stated, if the user has another."""
+        if not self.may_lack_feed:
+            raise GCodeError(
+                "F under G70: this control does not take it for inch/min; state G700 (Siemens), post in mm, or state "
+                "one feed for all cuts with --set path.feed_mm_min=..."
+            )
+        self.moves.note(Notice.FEED_PUT_ASIDE, line)
+        return 0.0
 
     def _take_spindle(self, block: Block, line: int) -> None:
         if 4.0 in block.g:

@@ -10,6 +10,7 @@ from sicp_formats.gcode.codes import HOMING, MOTION, kept_words, one_of, unknown
 from sicp_formats.gcode.keywords import TIP_CONTROL_OFF, TIP_CONTROL_ON
 from sicp_formats.gcode.machine import Machine
 from sicp_formats.gcode.words import Block, GCodeError
+from sicp_formats.gcode.work_offset import WorkOffset
 from sicp_formats.paths.arcs import Vector, arc_between, centre_for_radius
 from sicp_formats.paths.findings import Notice
 from sicp_formats.paths.moves import MoveList
@@ -35,12 +36,12 @@ class Motion:
 
     `mode` is the G code of the motion (None after G80), `position` holds None for an axis that is not known, `angles`
     the rotary angles in degrees. `vector_words` says that I J K state the tool axis, `tip_control` that the control
-    keeps the tip in place while the tool turns.
+    keeps the tip in place while the tool turns, `offset` is the work offset.
     """
 
     __slots__ = (
         "_centre_absolute", "_homed", "_last_feed", "_machine", "_may_lack_feed", "_moves", "_plane", "_rotary",
-        "absolute", "angles", "axis", "axis_stated", "mode", "position", "tip_control", "vector_words",
+        "absolute", "angles", "axis", "axis_stated", "mode", "offset", "position", "tip_control", "vector_words",
     )  # fmt: skip
 
     def __init__(self, moves: MoveList, machine: Machine, rotary: str | None, *, may_lack_feed: bool) -> None:
@@ -48,6 +49,7 @@ class Motion:
         self.axis: Vector = (0.0, 0.0, 1.0)
         self.mode: float | None = None
         self.absolute = True
+        self.offset = WorkOffset()
         self._moves = moves
         self._machine = machine
         self._rotary = rotary
@@ -78,7 +80,9 @@ class Motion:
             self.tip_control = False
         for word in unknown_m(block):
             self._moves.note(Notice.WORD_UNKNOWN, line, word)
-        text = kept_words(block)
+        self.offset.take(block, line)
+        arc = (self.mode or 0.0) >= 2.0 and any(letter in block.words for letter in "XYZIJK")
+        text = kept_words(block, arc=arc)
         if text:
             self._moves.event(EventKind.OTHER, line, 0.0, text)
 
@@ -99,6 +103,7 @@ class Motion:
         """Execute the coordinates, orientation and arc words of a block; they are taken out of it."""
         if self.mode is None:
             raise GCodeError("coordinates without a motion mode (G0 to G3); state one")
+        self.offset.use()
         words = block.words
         start, axis_before = list(self.position), self.axis
         text = [f"G{self.mode:g}", *(f"{letter}{words[letter]}" for letter in "XYZABC" if letter in words)]

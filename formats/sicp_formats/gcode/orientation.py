@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from sicp_formats.gcode.axis import angles_near, axis_from_angles
+from sicp_formats.gcode.dialect import Dialect
 from sicp_formats.gcode.state import LineEdit, ReadBlock, State
-from sicp_formats.gcode.style import Style, Styles, number_like
+from sicp_formats.gcode.style import Style, Styles
 from sicp_formats.gcode.words import Word
 from sicp_formats.paths.arcs import Vector, minus, norm, unit
 
@@ -30,15 +31,15 @@ class Orientation:
         The two rotary axes, see `gcode_axis.axis_from_angles`; None if angles say nothing.
     stated
         Letters of all words in the program.
-    decimal
-        Decimal mark of the program.
+    dialect
+        How the program writes numbers.
 
     `axis` has length 1; `is_stated` says that the program states one somewhere. `misses_deg` is by how much the axis
     last asked for differs from it because the program has no words for it at that place, `further_deg` by how much
     further than before a rotary axis was last turned.
     """
 
-    def __init__(self, rotary: str | None, stated: frozenset[str], decimal: str) -> None:
+    def __init__(self, rotary: str | None, stated: frozenset[str], dialect: Dialect) -> None:
         self.axis: Vector = (0.0, 0.0, 1.0)
         self.angles = dict.fromkeys("ABC", 0.0)
         self.misses_deg = 0.0
@@ -46,7 +47,7 @@ class Orientation:
         self.states_vectors = not stated.isdisjoint(_SIEMENS)
         self._rotary = rotary if rotary is not None and not stated.isdisjoint(rotary) else None
         self.is_stated = self.states_vectors or self._rotary is not None
-        self._decimal = decimal
+        self._dialect = dialect
 
     def follow(self, after: State) -> None:
         """Take over the axis that rules after a block that stays as it is and states one."""
@@ -128,12 +129,12 @@ class Orientation:
         written, missing = [], []
         for letter, word, value in zip(letters, words, axis, strict=True):
             if edit is not None and word is not None:
-                text = _changed(edit, word, value, _SAME_VECTOR, _VECTOR_DECIMALS, self._decimal)
+                text = self._changed(edit, word, value, _SAME_VECTOR, _VECTOR_DECIMALS)
             elif any(words) and abs(value) < _SAME_VECTOR:
                 text = "0"
             else:
                 style = _style(styles, letter, letters)
-                text = number_like(style.token, value, _VECTOR_DECIMALS, self._decimal)
+                text = self._dialect.written(style.token, value, _VECTOR_DECIMALS)
                 missing.append(f"{letter}{style.between}{text}")
             written.append(float(text.replace(",", ".")))
         self.axis = unit((written[0], written[1], written[2])) or axis
@@ -156,25 +157,24 @@ class Orientation:
             word = block.word(letter) if edit is not None else None
             base = self.angles[letter] if _turns_by(word, block.after) else 0.0
             if edit is not None and word is not None:
-                text = _changed(edit, word, target[letter] - base, _SAME_DEG, _ANGLE_DECIMALS, self._decimal)
+                text = self._changed(edit, word, target[letter] - base, _SAME_DEG, _ANGLE_DECIMALS)
             elif abs(target[letter] - self.angles[letter]) < _SAME_DEG:
                 continue
             else:
                 style = _style(styles, letter, tuple(rotary))
-                text = number_like(style.token, target[letter] - base, _ANGLE_DECIMALS, self._decimal)
+                text = self._dialect.written(style.token, target[letter] - base, _ANGLE_DECIMALS)
                 missing.append(f"{letter}{style.between}{text}")
             self.angles[letter] = base + float(text.replace(",", "."))
         self.axis = axis_from_angles(rotary, self.angles)
         return missing
 
-
-def _changed(edit: LineEdit, word: Word, value: float, same: float, decimals: int, decimal: str) -> str:
-    """Change a number unless it is right as it is; return what stands there."""
-    if abs(float(word.number) - value) < same:
-        return word.number
-    text = number_like(edit.text[word.number_start : word.number_end], value, decimals, decimal)
-    edit.number(word, text)
-    return text
+    def _changed(self, edit: LineEdit, word: Word, value: float, same: float, decimals: int) -> str:
+        """Change a number unless it is right as it is; return what stands there."""
+        if abs(float(word.number) - value) < same:
+            return word.number
+        text = self._dialect.written(edit.text[word.number_start : word.number_end], value, decimals)
+        edit.number(word, text)
+        return text
 
 
 def _stated(words: list[Word | None]) -> Vector | None:

@@ -65,7 +65,7 @@ class PlainMoves:
         self._motion = motion
         self._rotary = rotary
         self.block_number = -1
-        self.usable = True
+        self.usable = False  # until a block has shown that nothing unusual rules
 
     def execute(self, text: str, line: int) -> bool:
         """Execute a block; return False, with nothing changed, if it is not a plain move."""

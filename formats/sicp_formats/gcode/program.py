@@ -11,13 +11,15 @@ from sicp_cam.errors import FormatError
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import EventKind
 from sicp_formats.gcode.codes import HOMING, UNITS, heidenhain_text, one_of, refuse_codes
-from sicp_formats.gcode.machine import END_CODES, Machine
+from sicp_formats.gcode.dialect import Dialect, whole_numbers
+from sicp_formats.gcode.ending import is_torn, may_be_dropped
+from sicp_formats.gcode.machine import Machine
 from sicp_formats.gcode.motion import MOVING_LETTERS, Motion
 from sicp_formats.gcode.plain import PlainMoves, plain_words
-from sicp_formats.gcode.words import Block, GCodeError, Word, decimal_mark, split_block
+from sicp_formats.gcode.words import Block, GCodeError, Word, split_block
 from sicp_formats.paths.findings import Notice
 from sicp_formats.paths.moves import MoveList
-from sicp_formats.paths.text import program_lines
+from sicp_formats.paths.text import program_lines, suffix_of_program
 
 __all__ = ["GCodeOptions", "GCodeReader", "execute"]
 
@@ -41,6 +43,7 @@ class GCodeOptions:
     rotary: str | None = None
     block_skip: bool = True
     decimal: str | None = None
+    integers: str | None = None
 
 
 def execute(path: Path, content: bytes, options: GCodeOptions) -> GCodeReader:
@@ -61,7 +64,11 @@ def execute(path: Path, content: bytes, options: GCodeOptions) -> GCodeReader:
             raise FormatError(path, what, byte=len(kept))
         content = kept
     lines = program_lines(path, content, options.limits)
-    reader = GCodeReader(path, options, options.decimal or decimal_mark(lines))
+    suffix = suffix_of_program(path)
+    dialect = Dialect.of(suffix, lines, decimal=options.decimal, integers=options.integers)
+    reader = GCodeReader(path, options, dialect)
+    if options.integers is None and (whole := whole_numbers(lines, dialect)):
+        reader.moves.note(Notice.WHOLE_NUMBERS, whole[0], count=len(whole))
     if padding > 1 and options.recover:
         reader.moves.note(Notice.PADDING_DROPPED, 0, count=padding)
     reader.read(lines)
@@ -71,15 +78,15 @@ def execute(path: Path, content: bytes, options: GCodeOptions) -> GCodeReader:
 class GCodeReader:
     """Executes the blocks of one program in order.
 
-    `name` is what the program calls itself, `decimal` its decimal mark.
+    `name` is what the program calls itself, `dialect` how it writes numbers.
     """
 
-    def __init__(self, path: Path, options: GCodeOptions, decimal: str) -> None:
+    def __init__(self, path: Path, options: GCodeOptions, dialect: Dialect) -> None:
         self.moves = MoveList(path, options.limits, options.units, options.chord_mm, options.step_mm)
         self.name = ""
-        self.decimal = decimal
-        self.machine = Machine(self.moves)
+        self.dialect = dialect
         may_lack_feed = options.feed_mm_min is not None
+        self.machine = Machine(self.moves, may_lack_feed)
         self.motion = Motion(self.moves, self.machine, options.rotary, may_lack_feed=may_lack_feed)
         self.heidenhain = False
         self._options = options
@@ -94,11 +101,14 @@ class GCodeReader:
             if not plain(line, number) and self.execute(line, number, last=number == len(lines)):
                 self._note_rest(lines, number)
                 return
-        self.moves.note(Notice.LAST_STATEMENT_DROPPED if cut else Notice.END_MISSING, len(lines))
+        if cut:
+            self.moves.note(Notice.LAST_STATEMENT_DROPPED, len(lines))
+        else:
+            self.moves.note_missing_end(len(lines), torn=is_torn(lines[-1]))
 
     def with_points(self, lines: Sequence[str]) -> Sequence[str]:
         """Return the lines with decimal points, but for those with remarks, which are cut into words first."""
-        if self.decimal == ".":
+        if self.dialect.decimal == ".":
             return lines
         return [line if _REMARK.search(line) else line.replace(",", ".") for line in lines]
 
@@ -111,26 +121,25 @@ class GCodeReader:
         try:
             return self._line(line, number)
         except GCodeError as problem:
-            cut = "; the file ends in this line: drop it with --recover" if last else ""
-            raise self.moves.error(f"{problem}{cut}", number) from None
+            remedy = ""
+            if last and line.strip():
+                droppable = may_be_dropped(line, self.dialect.decimal)
+                remedy = f"; the file ends in this line: {'drop it with --recover' if droppable else 'export it again'}"
+            raise self.moves.error(f"{problem}{remedy}", number) from None
 
     def words(self, line: str) -> list[Word]:
         """Return the words of a line that was executed, with their places in it; none where it holds no block."""
-        if self.decimal == "." and (plain := plain_words(line)) is not None:
+        if self.dialect.decimal == "." and not self.dialect.increments and (plain := plain_words(line)) is not None:
             return plain
         text = line.strip(" \t\f\v\x1a")
         if not text or text[0] in "%<" or (self.heidenhain and _HEIDENHAIN_END.match(text)):
             return []
-        return split_block(_SKIPPED.sub(_blanked, line, count=1), self.decimal).placed
+        block = split_block(_SKIPPED.sub(_blanked, line, count=1), self.dialect.decimal)
+        return [word._replace(number=self._value(word.letter, word.number, block)) for word in block.placed]
 
     def is_cut(self, last: str) -> bool:
-        """Say whether the last line is to be dropped: it has no end, nor does it end the program."""
-        if not self._options.recover or not last.strip(" \t\x1a") or last.strip().startswith("%"):
-            return False
-        try:
-            return not any(code in END_CODES for code in split_block(last, self.decimal).m)
-        except GCodeError:
-            return True
+        """Say whether the last line is to be dropped: it has no end, nor does it move anything or end the program."""
+        return self._options.recover and may_be_dropped(last, self.dialect.decimal)
 
     def _note_rest(self, lines: Sequence[str], number: int) -> None:
         rest = [later for later, text in enumerate(lines[number:], number + 1) if text.strip(" \t%\x1a")]
@@ -158,7 +167,7 @@ class GCodeReader:
             line = _SKIPPED.sub(_blanked, line, count=1)
         if text[0] == ":":
             line = line.replace(":", "O", 1)
-        block = split_block(line, self.decimal)
+        block = split_block(line, self.dialect.decimal)
         for comment in block.comments:
             self.moves.event(EventKind.COMMENT, number, 0.0, comment)
         if "N" in block.words:
@@ -166,7 +175,12 @@ class GCodeReader:
         return self._settle(self._execute(block, number))
 
     def _settle(self, ended: bool) -> bool:
-        self._plain.usable = self.motion.absolute and self.machine.feed_mode == 94.0
+        self._plain.usable = (
+            self.motion.absolute
+            and self.machine.feed_mode == 94.0
+            and self.motion.offset.is_in_use
+            and not (self.dialect.increments or self.machine.feed_unit_unknown)
+        )
         return ended
 
     def _count_block(self, block_number: str, line: int) -> None:
@@ -190,7 +204,8 @@ class GCodeReader:
         if head := _HEIDENHAIN_HEAD.fullmatch(text):
             self.heidenhain, self._begun = True, True
             self.moves.state_unit(UNITS[float(head[2])], line)
-            self.machine.follow_unit()
+            self.machine.feed_unit_unknown = head[2] == "70"
+            self.machine.follow_unit(line)
         self.name = self.name or (head[1] if head else text.lstrip("%").removeprefix("_N_").strip())
         self.moves.event(EventKind.COMMENT, line, 0.0, text)
         return False
@@ -207,9 +222,13 @@ class GCodeReader:
             self.moves.event(EventKind.OTHER, line, 0.0, " ".join(words))
             return False
         self._take_units(block, line)
+        if 4.0 in block.g:
+            self._take_increments(block)
         self.machine.take(block, line, " ".join(f"M{code:g}" for code in block.m))
         refuse_codes(block, self.heidenhain)
         self.motion.take_modes(block, line)
+        if 4.0 not in block.g:
+            self._take_increments(block)
         self._move(block, line)
         if block.words:
             raise GCodeError(f"{next(iter(block.words))} word with no code that uses it; correct the line")
@@ -223,6 +242,15 @@ class GCodeReader:
                 raise GCodeError("I J K is the pole in Heidenhain's dialect; post arcs with R, or G1 blocks")
             self.motion.move(block, line)
 
+    def _take_increments(self, block: Block) -> None:
+        if self.dialect.increments:
+            block.words.update({name: self._value(name, number, block) for name, number in block.words.items()})
+
+    def _value(self, letter: str, number: str, block: Block) -> str:
+        if letter in "IJK" and self.motion.vector_words and (self.motion.mode or 0.0) < 2.0:
+            return number  # a vector, of whatever length
+        return self.dialect.value(letter, number, inch=self.moves.mm == 25.4 and 4.0 not in block.g)
+
     def _take_units(self, block: Block, line: int) -> None:
         code = one_of(block, UNITS)
         if code is None:
@@ -231,7 +259,10 @@ class GCodeReader:
         self.moves.state_unit(UNITS[code], line)
         if self.moves.mm != before and self.motion.position != [None, None, None]:
             raise GCodeError("the length unit changes after coordinates; state it at the head of the program")
-        self.machine.follow_unit()
+        self.machine.feed_unit_unknown = code == 70.0 and (self.dialect.siemens or self.heidenhain)
+        if code == 70.0 and not self.machine.feed_unit_unknown and self._options.feed_mm_min is None:
+            self.moves.note(Notice.FEED_IN_INCHES, line)
+        self.machine.follow_unit(line)
 
 
 def _blanked(found: re.Match[str]) -> str:

@@ -102,9 +102,9 @@ class Rewriting:
         self.written_axes: BoolArray = np.ones(len(moves.tips), dtype=np.bool_)
         self._text = ProgramText.of(content)
         self._lines = list(self._text.lines)
-        self._reader = GCodeReader(path, options, read.decimal)
-        self._orientation = Orientation(options.rotary, _stated(self._lines), read.decimal)
-        self._writer = BlockWriter(self._orientation, read.decimal)
+        self._reader = GCodeReader(path, options, read.dialect)
+        self._orientation = Orientation(options.rotary, _stated(self._lines), read.dialect)
+        self._writer = BlockWriter(self._orientation, read.dialect)
         self._rows = read.moves.rows
         self._moves = moves
         self._keep_arcs = keep_arcs

@@ -37,7 +37,7 @@ class Styles:
         return Style(between, line[word.number_start : word.number_end])
 
 
-def number_like(token: str, value: float, least: int, decimal: str = ".") -> str:
+def number_like(token: str, value: float, least: int, decimal: str = ".", *, point: bool = False) -> str:
     """Return a number in the style of another: its sign, decimals, leading zero, decimal point and mark.
 
     Parameters
@@ -51,11 +51,15 @@ def number_like(token: str, value: float, least: int, decimal: str = ".") -> str
         are left out.
     decimal
         Decimal mark of the program.
+    point
+        True for a decimal point even if the token has none: a control may take a number without one for thousandths.
 
     >>> number_like("10.", 2.5, 4), number_like("+10.000", 2.50004, 4), number_like(".5", -0.25, 4)
     ('2.5', '+2.500', '-.25')
     >>> number_like("10,5", 3.0, 4, ","), number_like("7", 3.0, 4), number_like("7.", 3.0, 4)
     ('3,0', '3', '3.')
+    >>> number_like("7", 3.0, 4, point=True), number_like("7", 3.0, 4, ",", point=True)
+    ('3.', '3,0')
     """
     digits = token.lstrip("+-").replace(decimal, ".")
     own = len(digits.partition(".")[2])
@@ -64,5 +68,7 @@ def number_like(token: str, value: float, least: int, decimal: str = ".") -> str
     negative = value < 0.0 and bool((whole + part).strip("0"))
     if digits.startswith(".") and whole == "0" and part:
         whole = ""
+    if point and not part and decimal == ",":
+        part = "0"  # a comma at the end might part two words
     sign = "-" if negative else "+" if token.startswith("+") else ""
-    return f"{sign}{whole}{decimal if part or '.' in digits else ''}{part}"
+    return f"{sign}{whole}{decimal if part or point or '.' in digits else ''}{part}"

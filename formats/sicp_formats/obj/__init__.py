@@ -1,13 +1,15 @@
 """OBJ meshes and clouds as scans or nominal parts, read strictly; and the writers.
 
 The format is that of Wavefront's "Object Files (.obj)" (Advanced Visualizer 3.0, appendix B1), with the colours that
-many programs put behind the coordinates of a vertex. It states no unit of length.
+many programs put behind the coordinates of a vertex. It states no unit of length; the writers state it in a comment,
+`# unit mm`, which the readers follow.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +20,11 @@ from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import FloatArray, IntArray, Part, Scan, Source
 from sicp_cam.units import mm_per_unit
 from sicp_formats.obj.statements import Statements, statements
-from sicp_formats.source import describe, read_bytes
+from sicp_formats.source import describe, read_bytes, unit_to_state
 from sicp_formats.surfaces.checks import Code, unit_normals
+from sicp_formats.surfaces.ending import without_cut_line
 from sicp_formats.surfaces.polygons import Checked, PolygonMesh, Polygons, as_part, as_scan, checked, whole_numbers
+from sicp_formats.surfaces.unit import chosen_unit
 from sicp_formats.tables.rows import numbers
 
 __all__ = ["read_part", "read_scan", "write_part", "write_scan"]
@@ -39,12 +43,13 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
     path
         The file.
     units
-        Unit of its coordinates, one of `sicp_cam.units.MM_PER_UNIT`; millimetres are assumed if left out.
+        Unit of its coordinates, one of `sicp_cam.units.MM_PER_UNIT`; if left out, that of a comment such as
+        `# unit mm`, or else millimetres.
     limits
         Caps on what the file may ask for.
     recover
         Drop vertices and normals that are not finite, and faces that use them or vertices that do not exist; each
-        with a finding of level WARN.
+        with a finding of level WARN. Drop a last vertex that may be cut short, too.
 
     Returns
     -------
@@ -60,7 +65,7 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
         If a statement is unknown, a number is none or not finite, a face points at a vertex that does not exist, or
         what is left cannot register; the message names the line.
     UnitError
-        If the unit is unknown.
+        If the unit is unknown, or not the one that the file states.
     """
     mesh, source = _read(path, units, limits, recover)
     return as_scan(mesh, source)
@@ -89,7 +94,7 @@ def write_scan(scan: Scan, *, unit: str = "mm") -> bytes:
     >>> write_scan(Scan(np.eye(3))).decode().splitlines()[1]
     'v 1.0 0.0 0.0'
     """
-    return _encoded(scan.points_mm, scan.normals, scan.faces, scan.columns, unit)
+    return _encoded(scan.points_mm, scan.normals, scan.faces, scan.columns, unit, unit_to_state(scan.source, unit))
 
 
 def write_part(part: Part, *, unit: str = "mm") -> bytes:
@@ -104,17 +109,20 @@ def write_part(part: Part, *, unit: str = "mm") -> bytes:
     """
     if not len(part.mesh.faces):
         raise JobError("the part has no triangles to write")
-    return _encoded(part.mesh.vertices_mm, part.mesh.normals, part.mesh.faces, {}, unit)
+    return _encoded(
+        part.mesh.vertices_mm, part.mesh.normals, part.mesh.faces, {}, unit, unit_to_state(part.source, unit)
+    )
 
 
 def _read(path: Path, units: str | None, limits: Limits, recover: bool) -> tuple[Checked, Source]:
-    unit = "mm" if units is None else units
-    factor = mm_per_unit(unit)
+    mm_per_unit("mm" if units is None else units)
     content = read_bytes(path, limits)
-    found = statements(path, content, limits)
-    mesh = checked(path, _mesh(path, found, recover), factor, limits, recover)
-    source = describe(path, content, format="OBJ", unit=unit, unit_stated=units is not None)
-    return mesh, source
+    kept, cut = without_cut_line(path, content, recover=recover, keyword=b"v ")
+    found = statements(path, kept, limits)
+    unit, stated, findings = chosen_unit(path, found.unit, units)
+    mesh = checked(path, _mesh(path, found, recover), mm_per_unit(unit), limits, recover)
+    source = describe(path, content, format="OBJ", unit=unit, unit_stated=stated)
+    return replace(mesh, findings=findings + cut + mesh.findings), source
 
 
 def _mesh(path: Path, found: Statements, recover: bool) -> PolygonMesh:
@@ -210,12 +218,13 @@ def _encoded(
     faces: IntArray | None,
     columns: Mapping[str, FloatArray],
     unit: str,
+    stated: str,
 ) -> bytes:
     values = points_mm / mm_per_unit(unit)
     if all(name in columns for name in _COLOURS):
         colours = np.column_stack([columns[name] for name in _COLOURS])
         values = np.hstack([values, colours / (255.0 if colours.max(initial=0.0) > 1.0 else 1.0)])
-    lines = [f"# coordinates in {unit}"]
+    lines = [f"# unit {stated}"] if stated else []
     lines += ["v " + " ".join(map(repr, row)) for row in values.tolist()]
     if normals is not None:
         lines += ["vn " + " ".join(map(repr, row)) for row in normals.tolist()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +11,7 @@ from sicp_cam.errors import FormatError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import Limits
 from sicp_formats.surfaces.checks import Code
+from sicp_formats.surfaces.unit import StatedUnit, unit_in
 from sicp_formats.tables.rows import Row, text_lines
 
 __all__ = ["Statements", "statements"]
@@ -22,17 +24,19 @@ _FREE_FORM = frozenset(
 )
 _NAMES = frozenset(b"g o usemtl mtllib usemap maplib shadow_obj trace_obj".split())
 """Statements with names, in which a backslash at the end may belong to a path."""
+_COMMENT = re.compile(rb"#([^\r\n]{0,999})")
 
 
 @dataclass(frozen=True, slots=True)
 class Statements:
-    """Rows of numbers by kind, and how many vertices and normals stood before each face."""
+    """Rows of numbers by kind, how many vertices and normals stood before each face, and the unit of the comments."""
 
     vertices: list[Row] = field(default_factory=list)
     normals: list[Row] = field(default_factory=list)
     faces: list[Row] = field(default_factory=list)
     vertices_before: list[int] = field(default_factory=list)
     normals_before: list[int] = field(default_factory=list)
+    unit: StatedUnit | None = None
     findings: tuple[Finding, ...] = ()
 
 
@@ -42,8 +46,8 @@ def statements(path: Path, content: bytes, limits: Limits) -> Statements:
     Raises
     ------
     FormatError
-        If a statement is unknown, a polygon has more corners than `limits.list_length`, or there are no vertices or
-        more than `limits.points`.
+        If a statement is unknown, a polygon has more corners than `limits.list_length`, there are no vertices or
+        more than `limits.points`, or comments state two units.
     """
     vertices: list[Row] = []
     normals: list[Row] = []
@@ -55,6 +59,9 @@ def statements(path: Path, content: bytes, limits: Limits) -> Statements:
     for number, text in _lines(path, content, limits):
         word, *rest = text.split(None, 1)
         row = (number, rest[0] if rest else b"")
+        if not rest and word in (b"v", b"vn"):
+            what = f"{word.decode('ascii')} without numbers; the file is damaged or cut short"
+            raise FormatError(path, what, line=number)
         if word == b"v":
             vertices.append(row)
         elif word in (b"f", b"fo"):
@@ -72,7 +79,17 @@ def statements(path: Path, content: bytes, limits: Limits) -> Statements:
         what = f"{len(vertices)} vertices are more than the limit points = {limits.points}; raise it"
         raise FormatError(path, what)
     _check_polygons(path, faces, limits)
-    return Statements(vertices, normals, faces, vertices_before, normals_before, findings)
+    return Statements(vertices, normals, faces, vertices_before, normals_before, _unit(path, content), findings)
+
+
+def _unit(path: Path, content: bytes) -> StatedUnit | None:
+    unit = None
+    line_end = b"\n" if b"\n" in content else b"\r"
+    for match in _COMMENT.finditer(content):
+        if b"unit" in (comment := match[1].lower()) or b"coordinates" in comment:
+            line = content.count(line_end, 0, match.start()) + 1
+            unit = unit_in(path, match[1].decode("utf-8", "replace"), line, unit)
+    return unit
 
 
 def _lines(path: Path, content: bytes, limits: Limits) -> Iterator[Row]:

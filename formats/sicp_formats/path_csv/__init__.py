@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from sicp_cam.errors import FormatError, JobError, printable
+from sicp_cam.errors import JobError, printable
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import Event, EventKind, IntArray, ToolPath
 from sicp_formats.path_csv.columns import (
@@ -33,7 +34,21 @@ __all__ = ["read_path"]
 _FLAGS = {"0": False, "1": True, "0.0": False, "1.0": True, "false": False, "true": True}
 _EULER = ("xyz", "zyx")
 _NOT_UNIT_AT_ALL = 0.02
+_SHORTEST_AXIS, _LONGEST_AXIS = 0.5, 2.0
 _LARGEST_ANGLE_DEG = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class _Options:
+    """How a file is to be read: the options of `read_path`, with the column and sign of the tool axis as `side`."""
+
+    path: Path
+    limits: Limits
+    units: str | None
+    feed_mm_min: float | None
+    columns: str | None
+    euler: str | None
+    side: tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +91,7 @@ def read_path(
     limits
         Caps on the file and the path.
     recover
-        True to drop a last row that is cut short. No other row is ever left out: the path would cut the part.
+        Takes no effect: every row moves the tool, so none is ever left out.
     feed_mm_min
         Feed for cutting moves that the table gives none.
     chord_mm, step_mm
@@ -85,7 +100,7 @@ def read_path(
         Names of the columns, separated by commas, instead of a header; ``-`` for one that is not read.
     euler
         How angles in degrees make an orientation: ``xyz`` for R = Rx Ry Rz, ``zyx`` for R = Rz Ry Rx (W P R of
-        Fanuc, C B A of KUKA).
+        Fanuc, C B A of KUKA: with it columns a,b,c are angles about z, y and x).
     tool_axis
         Axis of the tool frame that points from the tip to the holder, for angles and quaternions.
 
@@ -102,17 +117,22 @@ def read_path(
     if euler is not None and euler not in _EULER:
         raise JobError(f"path.euler = {euler!r} must be one of {', '.join(_EULER)}")
     side = tool_side(tool_axis)
-    content = read_bytes(path, limits)
-    moves = MoveList(path, limits, units)
+    options = _Options(path, limits, units, feed_mm_min, columns, euler, side)
+    return _path_of(options, read_bytes(path, limits))
+
+
+def _path_of(options: _Options, content: bytes) -> ToolPath:
+    """Return the path that the bytes of a table hold."""
+    path, limits = options.path, options.limits
+    moves = MoveList(path, limits, options.units)
     rows = _rows(moves, program_lines(path, content, limits))
-    table = None
-    if rows:
-        table = _layout(moves, rows, columns, side, euler)
-        _read_rows(moves, table, rows, recover)
-    built = moves.build(content, format="CSV", feed_mm_min=feed_mm_min)
-    if table is None:
-        return built
-    original = CsvOriginal(content, table.delimiter, table.columns, built.tips_mm, built.axes, built.lines, moves.mm)
+    if not rows:
+        return moves.build(content, format="CSV")
+    table = _layout(moves, rows, options)
+    mark = _read_rows(moves, table, rows)
+    built = moves.build(content, format="CSV", feed_mm_min=options.feed_mm_min)
+    read_back = partial(_path_of, options)
+    original = CsvOriginal(path, content, table.delimiter, mark, table.columns, built, moves.mm, read_back)
     return replace(built, events=_in_place(built.events, built.lines), original=original)
 
 
@@ -134,10 +154,9 @@ def _in_place(events: tuple[Event, ...], lines: IntArray) -> tuple[Event, ...]:
     return tuple(replace(event, before_move=place) for event, place in zip(events, places, strict=True))
 
 
-def _layout(
-    moves: MoveList, rows: list[tuple[int, str]], names: str | None, side: tuple[int, int], euler: str | None
-) -> _Table:
+def _layout(moves: MoveList, rows: list[tuple[int, str]], options: _Options) -> _Table:
     """Find out the layout from the first lines, and take the header off the rows."""
+    names, euler = options.columns, options.euler
     line, first = rows[0]
     delimiter = delimiter_of(first)
     if first.strip().lower().startswith("sep=") and len(rows) > 1:
@@ -147,9 +166,9 @@ def _layout(
     has_numbers = any(NUMBER_CELL.fullmatch(cell) for cell in cells)
     try:
         if names is not None:
-            columns = columns_of_names(names_of_option(names))
+            columns = columns_of_names(names_of_option(names), euler)
         else:
-            columns = columns_of_width(len(cells)) if has_numbers else columns_of_names(cells)
+            columns = columns_of_width(len(cells)) if has_numbers else columns_of_names(cells, euler)
     except HeaderError as problem:
         if names is not None:
             raise JobError(f"path.columns: {problem}") from None
@@ -159,7 +178,7 @@ def _layout(
         if names is not None:
             moves.events.append(Event(0, EventKind.COMMENT, 0.0, first.strip(), line))
     _judge(moves, columns, line, euler)
-    return _Table(delimiter, columns, side, euler)
+    return _Table(delimiter, columns, options.side, euler)
 
 
 def _judge(moves: MoveList, columns: Columns, line: int, euler: str | None) -> None:
@@ -170,25 +189,27 @@ def _judge(moves: MoveList, columns: Columns, line: int, euler: str | None) -> N
     if columns.kind == "angles" and euler is None:
         what = "the angles of the orientation can be meant in several ways; say how with --set path.euler=xyz or zyx"
         raise moves.error(what, line)
+    if columns.kind != "angles" and euler is not None:
+        what = (
+            f"path.euler = {euler}, but no orientation is read from angles; name the columns of the angles "
+            "(rx,ry,rz or w,p,r, and a,b,c where they are meant as zyx), or leave the option out"
+        )
+        raise moves.error(what, line)
     for name in columns.unused:
         moves.note(Notice.COLUMN_UNUSED, line, name)
 
 
-def _read_rows(moves: MoveList, table: _Table, rows: list[tuple[int, str]], recover: bool) -> None:
+def _read_rows(moves: MoveList, table: _Table, rows: list[tuple[int, str]]) -> str:
+    """Append the moves of the rows; return the decimal mark of the table."""
     axis: Vector | None = None
     decimals: set[str] = set()
+    others = table.columns.orientation + (() if table.columns.feed is None else (table.columns.feed,))
+    marks_of_others: set[str] = set()
     feed_mm = table.columns.mm_min_per_feed or moves.mm
     for line, text in rows:
-        try:
-            cells, tip, turn = _row(moves, table, text, line)
-        except FormatError as error:
-            if line != rows[-1][0] or len(rows) < 2:
-                raise
-            if not recover:
-                raise moves.error(f"{error.what}; or repair it with --recover if the row is cut short", line) from None
-            moves.note(Notice.LAST_ROW_DROPPED, line)
-            return
-        decimals.update(mark for column in table.columns.tip for mark in ".," if mark in cells[column])
+        cells, tip, turn = _row(moves, table, text, line)
+        decimals |= _marks(cells, table.columns.tip)
+        marks_of_others |= _marks(cells, others)
         if len(decimals) > 1:
             raise moves.error("decimal points and decimal commas in one table; use one of them", line)
         axis = _axis(moves, table, turn, axis, line)
@@ -197,6 +218,11 @@ def _read_rows(moves: MoveList, table: _Table, rows: list[tuple[int, str]], reco
             raise moves.error("negative feed; correct the row", line)
         x, y, z = (value * moves.mm for value in tip)
         moves.move((x, y, z), axis, feed, _flag(moves, cells, table.columns.rapid, line), line)
+    return "," if "," in (decimals or marks_of_others) else "."
+
+
+def _marks(cells: list[str], columns: Sequence[int]) -> set[str]:
+    return {mark for column in columns for mark in ".," if mark in cells[column]}
 
 
 def _row(moves: MoveList, table: _Table, text: str, line: int) -> tuple[list[str], list[float], list[float]]:
@@ -204,7 +230,11 @@ def _row(moves: MoveList, table: _Table, text: str, line: int) -> tuple[list[str
     cells = cells_of(text, table.delimiter)
     columns = table.columns
     if len(cells) != columns.width:
-        hint = "; are there decimal commas?" if table.delimiter == "," else "; complete the row"
+        hint = (
+            "; are there decimal commas?"
+            if table.delimiter == "," and len(cells) > columns.width
+            else "; complete the row"
+        )
         raise moves.error(f"{len(cells)} cells where {columns.width} are expected{hint}", line)
     return cells, _numbers(moves, cells, columns.tip, line), _numbers(moves, cells, columns.orientation, line)
 
@@ -238,7 +268,13 @@ def _vector(moves: MoveList, table: _Table, now: Vector, before: Vector | None, 
     if not table.columns.named and abs(norm(now) - 1.0) > _NOT_UNIT_AT_ALL:
         what = (
             "columns 4 to 6 are no unit vectors; angles or decimal commas? Add a header that names the columns, or "
-            "--set path.columns=x,y,z,rx,ry,rz"
+            "--set path.columns=x,y,z,rx,ry,rz with path.euler=xyz or zyx"
+        )
+        raise moves.error(what, line)
+    if not _SHORTEST_AXIS <= norm(now) <= _LONGEST_AXIS:
+        what = (
+            f"the tool axis has the length {norm(now):.4g}, so it is no direction; if these are angles, name the "
+            "columns rx,ry,rz or w,p,r and say how they turn with --set path.euler=xyz or zyx"
         )
         raise moves.error(what, line)
     return now

@@ -109,14 +109,23 @@ def columns_of_width(width: int) -> Columns:
         return Columns(3, (0, 1, 2), named=False)
     if width == 6:
         return Columns(6, (0, 1, 2), "axis", (3, 4, 5), named=False)
-    proposal = "x,y,z,i,j,k,feed or x,y,z,qw,qx,qy,qz" if width == 7 else "x,y,z,i,j,k,-"
+    proposal = "x,y,z,i,j,k,-"
+    if width == 7:
+        proposal = "x,y,z,i,j,k,feed or x,y,z,qw,qx,qy,qz, or x,y,z,w,p,r,- with --set path.euler=xyz or zyx"
     raise HeaderError(
         f"{width} columns without a header; name them with --set path.columns={proposal} (- for one that is not read)"
     )
 
 
-def columns_of_names(cells: Sequence[str]) -> Columns:
+def columns_of_names(cells: Sequence[str], euler: str | None = None) -> Columns:
     """Return the layout of a table whose columns have names, units among them (`x [mm]`, `feed_mm_min`).
+
+    Parameters
+    ----------
+    cells
+        The names.
+    euler
+        How the user says that angles are meant; only for ``zyx`` are A, B and C angles (about z, y and x: KUKA).
 
     Raises
     ------
@@ -133,7 +142,7 @@ def columns_of_names(cells: Sequence[str]) -> Columns:
             f"the header does not name {', '.join(missing)}; it needs x,y,z and should have i,j,k: rename the columns "
             "or name them with --set path.columns=..."
         )
-    kind, orientation = _orientation(names)
+    kind, orientation = _orientation(names, euler)
     speed = next((name for name in ("feed", "speed") if name in names), None)
     if speed == "speed" and parsed[names.index("speed")][1] not in _FEEDS:
         speed = None  # of the spindle or of the tool? Only a unit tells.
@@ -165,11 +174,13 @@ def _parsed(cell: str) -> tuple[str, str]:
     return _ALIASES.get(name, name), unit
 
 
-def _orientation(names: Sequence[str]) -> tuple[Kind, tuple[str, ...]]:
-    """Return the first orientation that is named in full: vectors before quaternions before angles."""
+def _orientation(names: Sequence[str], euler: str | None) -> tuple[Kind, tuple[str, ...]]:
+    """Return the first orientation that is named in full: vectors before quaternions before angles about x, y, z."""
     for kind, group in _ORIENTATIONS:
         if all(name in names for name in group):
             return kind, group
+    if euler == "zyx" and all(name in names for name in "abc"):
+        return "angles", ("c", "b", "a")
     if any(name in names for name in "ijk"):
         raise HeaderError("the header names only part of i,j,k; name all three or none")
     for _, group in _ORIENTATIONS[1:-1]:

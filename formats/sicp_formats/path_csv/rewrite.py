@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from sicp_cam.errors import InputError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import FloatArray, IntArray, Rewritten, ToolPath
 from sicp_formats.path_csv.columns import NUMBER_CELL, Columns
 from sicp_formats.path_csv.rows import cell_places, without_remark
+from sicp_formats.paths.findings import Notice, Tally
 
 __all__ = ["CsvOriginal"]
 
@@ -22,6 +25,7 @@ _LINES = re.compile(r"[^\r\n]*(?:\r\n|\r|\n|$)")
 _END = re.compile(r"[\r\n]*\Z")
 _TIP_DECIMALS, _AXIS_DECIMALS = 4, 7
 _SAME_AXIS_DEG = 1e-3
+_TIP_MM, _AXIS = 2e-4, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,23 +34,26 @@ class CsvOriginal:
 
     Parameters
     ----------
-    content
-        The bytes of the file.
-    delimiter, columns
-        Its layout.
-    tips_mm, axes, lines
+    file, content
+        The file and its bytes.
+    delimiter, decimal, columns
+        Its layout: the mark between cells, the decimal mark, and what the columns hold.
+    read
         The path as it was read.
     mm
         Millimetres in one unit of the table.
+    read_back
+        Reads the bytes of a table as this one was read.
     """
 
+    file: Path
     content: bytes
     delimiter: str | None
+    decimal: str
     columns: Columns
-    tips_mm: FloatArray
-    axes: FloatArray
-    lines: IntArray
+    read: ToolPath
     mm: float
+    read_back: Callable[[bytes], ToolPath]
 
     @property
     def suffix(self) -> str:
@@ -54,27 +61,49 @@ class CsvOriginal:
         return ".csv"
 
     def rewritten(self, path: ToolPath, source_moves: IntArray) -> Rewritten:
-        """Return the table with the moves of a path; an added row copies all other cells of the row behind it."""
+        """Return the table with the moves of a path; an added row copies all other cells of the row behind it.
+
+        The result is read again and compared with the path before it is given out.
+        """
         findings = self._orientation_findings(path, source_moves)
         if any(finding.level is Level.FAIL for finding in findings):
             return Rewritten(b"", findings)
         encoding, text = _decoded(self.content)
         lines = _LINES.findall(text)
-        rows: dict[int, list[str]] = {line: [] for line in self.lines.tolist()}
+        rows: dict[int, list[str]] = {line: [] for line in self.read.lines.tolist()}
         before: FloatArray | None = None
         for move, source in enumerate(source_moves.tolist()):
-            line = int(self.lines[source])
+            line = int(self.read.lines[source])
             tip, axis = path.tips_mm[move], path.axes[move]
             rows[line].append(self._row(lines[line - 1], source, tip, axis, before))
             before = axis
         end = next((found for line in lines if (found := _line_end(line))), "\n")
-        return Rewritten("".join(_replaced(lines, rows, end)).encode(encoding), findings)
+        content = "".join(_replaced(lines, rows, end)).encode(encoding)
+        if problem := self._disagreement(content, path):
+            tally = Tally()
+            tally.note(Notice.NOT_REWRITTEN, 0, problem)
+            return Rewritten(b"", tally.findings(self.file))
+        return Rewritten(content, findings)
+
+    def _disagreement(self, content: bytes, path: ToolPath) -> str:
+        """Read what was written; return what of it is not the path, empty if it is."""
+        try:
+            found = self.read_back(content)
+        except InputError as error:
+            return f"the table as written cannot be read ({error})"
+        if len(found) != len(path):
+            return f"it has {len(found)} moves where the path has {len(path)}"
+        wrong = ~(np.abs(found.tips_mm - path.tips_mm).max(axis=1) <= _TIP_MM)
+        if self.columns.orientation and self.columns.kind == "axis":
+            wrong |= ~(np.abs(found.axes - path.axes).max(axis=1) <= _AXIS)
+        wrong |= (found.rapid != path.rapid) | ~np.isclose(found.feeds_mm_min, path.feeds_mm_min)
+        return f"move {int(np.flatnonzero(wrong)[0])} reads back as another one" if wrong.any() else ""
 
     def _orientation_findings(self, path: ToolPath, source_moves: IntArray) -> tuple[Finding, ...]:
         """Tell of axes that the table has no place for, or that it holds as angles."""
         if self.columns.orientation and self.columns.kind == "axis":
             return ()
-        cosines = np.einsum("ni,ni->n", path.axes, self.axes[source_moves])
+        cosines = np.einsum("ni,ni->n", path.axes, self.read.axes[source_moves])
         largest = math.degrees(math.acos(min(1.0, max(-1.0, float(cosines.min())))))
         if largest <= _SAME_AXIS_DEG:
             return ()
@@ -91,7 +120,7 @@ class CsvOriginal:
         text, _ = without_remark(line)
         places = cell_places(text.rstrip("\r\n"), self.delimiter)
         changes = {}
-        for column, value, was in zip(self.columns.tip, tip, self.tips_mm[source], strict=True):
+        for column, value, was in zip(self.columns.tip, tip, self.read.tips_mm[source], strict=True):
             if value != was:
                 changes[column] = (
                     float(value) / self.mm,
@@ -103,7 +132,9 @@ class CsvOriginal:
                 changes[column] = (float(value), _AXIS_DECIMALS, 5e-8)
         for column, (value, decimals, tolerance) in sorted(changes.items(), reverse=True):
             start, end = places[column]
-            line = line[:start] + _rewritten_cell(line[start:end], value, decimals, tolerance, line) + line[end:]
+            line = (
+                line[:start] + _rewritten_cell(line[start:end], value, decimals, tolerance, self.decimal) + line[end:]
+            )
         return line
 
     def _keeps_axis(
@@ -113,10 +144,10 @@ class CsvOriginal:
         cells = [line[slice(*places[column])] for column in self.columns.orientation]
         if all(not cell.strip(" \t\"'+-0.,") for cell in cells):
             return before is not None and bool((axis == before).all())
-        return bool((axis == self.axes[source]).all())
+        return bool((axis == self.read.axes[source]).all())
 
 
-def _rewritten_cell(cell: str, value: float, decimals: int, tolerance: float, line: str) -> str:
+def _rewritten_cell(cell: str, value: float, decimals: int, tolerance: float, mark: str) -> str:
     """Return a cell with another number, in the way that it is written, or as it is where the number rounds to it."""
     found = NUMBER_CELL.search(cell)
     number = found[0] if found else "0"
@@ -129,12 +160,7 @@ def _rewritten_cell(cell: str, value: float, decimals: int, tolerance: float, li
     text = f"{value:.{places}f}"
     if not text.strip("-0."):
         text = text.lstrip("-")
-    uses_comma = (fraction[0][0] if fraction else "") == "," or (fraction is None and _has_decimal_comma(line))
-    return cell.replace(number, text.replace(".", ",") if uses_comma else text, 1)
-
-
-def _has_decimal_comma(line: str) -> bool:
-    return "." not in line and bool(re.search(r"[0-9],[0-9]", line)) and bool(re.search(r"[;\t ]", line))
+    return cell.replace(number, text.replace(".", fraction[0][0] if fraction else mark), 1)
 
 
 def _replaced(lines: list[str], rows: dict[int, list[str]], end: str) -> Iterator[str]:

@@ -43,6 +43,7 @@ class Notice(IntEnum):
     BLOCKS_LEFT_AS_THEY_WERE = 325
     ROTARY_TURNS_FURTHER = 326
     AXIS_NOT_IN_FORCE = 327
+    WHOLE_NUMBERS = 328
     NO_CURVE = 330
     SURFACE_LEFT_OUT = 331
     LAYER_LEFT_OUT = 332
@@ -57,19 +58,21 @@ class Notice(IntEnum):
     STATEMENT_AS_TEXT = 351
     PADDING_DROPPED = 352
     BLOCKS_RESTART = 355
+    FEED_PUT_ASIDE = 356
+    FEED_IN_INCHES = 357
     DRAWING_REPAIRED = 360
     COUNT_IGNORED = 361
     CURVE_LEFT_OUT = 362
     VALUE_REPLACED = 363
     DRAWING_LARGE = 364
-    LAST_ROW_DROPPED = 365
+    NO_RETRACT = 366
 
 
 _NOTICES = {
     Notice.UNIT_ASSUMED: (Level.WARN, "no length unit is stated, mm assumed; state it with --path-units"),
     Notice.FEED_MISSING: (
         Level.WARN,
-        "{count} cutting moves have no feed; state one with --set path.feed_mm_min=...",
+        "{count} cutting moves have no feed{detail}; state one with --set path.feed_mm_min=...",
     ),
     Notice.AXIS_ASSUMED: (Level.WARN, "no tool axis is stated, (0, 0, 1) assumed for the whole path"),
     Notice.AXIS_NOT_UNIT: (Level.WARN, "{count} tool axes are not of length 1 and were scaled to it"),
@@ -99,7 +102,7 @@ _NOTICES = {
         Level.WARN,
         "{count} rapid moves to or from a machine position (G28, G30, G53) are not part of the path",
     ),
-    Notice.ARC_AS_POINTS: (Level.INFO, "{count} arcs have changed their shape and were written as points"),
+    Notice.ARC_AS_POINTS: (Level.INFO, "{count} arcs were moved or bent, and were written as points"),
     Notice.AXIS_NOT_WRITTEN: (
         Level.WARN,
         "the program states no tool axis, so none was written: the correction would turn it by up to {detail} degrees",
@@ -147,6 +150,19 @@ _NOTICES = {
         Level.WARN,
         "the block numbers go back {count} times; the file was read on as one program: check that it is one",
     ),
+    Notice.WHOLE_NUMBERS: (
+        Level.WARN,
+        "{count} blocks have coordinates without a decimal point, which were read as whole units; a control with "
+        "least-increment input takes them for thousandths: say which with --set path.integers=units or thousandths",
+    ),
+    Notice.FEED_PUT_ASIDE: (
+        Level.WARN,
+        "{count} feeds under G70, of which the unit is not known, were not read; path.feed_mm_min took their place",
+    ),
+    Notice.FEED_IN_INCHES: (
+        Level.WARN,
+        "feeds under G70 were read as inch/min; a Siemens control takes them in the machine's unit: state G700 there",
+    ),
     Notice.JOINTS_LEFT_OUT: (
         Level.WARN,
         "{count} moves to joint angles before the first or after the last known point are not part of the path",
@@ -161,7 +177,11 @@ _NOTICES = {
         "{count} calls were taken to move nothing, as --set path.calls=... says: {detail}",
     ),
     Notice.TEXT_READ_AS: (Level.INFO, "the suffix does not tell what the text is; it was read as {detail}"),
-    Notice.LAST_ROW_DROPPED: (Level.WARN, "the last row is cut short and was dropped; check where the path ends"),
+    Notice.NO_RETRACT: (
+        Level.WARN,
+        "a drawing tells no way to its curves: {count} rapid moves run straight at the height of the drawing, and "
+        "nothing retracts at the end; lift them with --set path.clearance_mm=...",
+    ),
     Notice.NO_CURVE: (Level.INFO, "{count} entities of the drawing are no curves and were not read: {detail}"),
     Notice.SURFACE_LEFT_OUT: (
         Level.WARN,
@@ -187,12 +207,21 @@ _NOTICES = {
     ),
 }
 
+_GRAVE = {
+    Notice.END_MISSING: (
+        Level.WARN,
+        "the program has no end statement and ends in a cut{detail}; check that the file is complete",
+    ),
+}
+"""What is said in place of that where a notice was taken as grave."""
+
 
 @dataclass(slots=True)
 class _Noted:
     line: int
     count: int = 0
     details: list[str] = field(default_factory=list)
+    grave: bool = False
 
 
 @dataclass(slots=True)
@@ -208,9 +237,10 @@ class Tally:
 
     noted: dict[Notice, _Noted] = field(default_factory=dict)
 
-    def note(self, notice: Notice, line: int, detail: str = "", count: int = 1) -> None:
-        """Count something worth a finding; its first line is kept, and each detail once."""
+    def note(self, notice: Notice, line: int, detail: str = "", count: int = 1, *, grave: bool = False) -> None:
+        """Count something worth a finding; its first line is kept, and each detail once. Grave is grave for good."""
         noted = self.noted.setdefault(notice, _Noted(line))
+        noted.grave = noted.grave or grave
         noted.count += count
         if detail and detail not in noted.details and len(noted.details) < _MOST_DETAILS:
             noted.details.append(detail)
@@ -219,7 +249,7 @@ class Tally:
         """Return one finding for each kind of notice, in the order of their codes."""
         found = []
         for notice, noted in sorted(self.noted.items()):
-            level, text = _NOTICES[notice]
+            level, text = (_GRAVE if noted.grave else _NOTICES)[notice]
             message = text.format(count=noted.count, detail=printable("; ".join(noted.details)))
             where = f"{printable(str(path))}, line {noted.line}" if noted.line else printable(str(path))
             found.append(Finding(int(notice), level, message, where))

@@ -18,7 +18,7 @@ from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import BoolArray, Event, EventKind, FloatArray, IntArray, Original, ToolPath
 from sicp_cam.rigid_motion import from_parts
 from sicp_cam.units import mm_per_unit
-from sicp_formats.paths.arcs import Arc, Vector, unit
+from sicp_formats.paths.arcs import Arc, Vector, dot, norm, unit
 from sicp_formats.paths.findings import Notice, Tally
 from sicp_formats.source import describe
 
@@ -28,6 +28,8 @@ _COLUMNS = 9  # x, y, z, i, j, k, feed, rapid, line
 _UNIT_AXIS_TOLERANCE = 1e-3
 _SHORTEST_AXIS = 1e-6
 _LONGEST_AXIS = 1e9
+_PER_TURN = "{} state it per revolution, which cannot be converted: no speed in rev/min is stated"
+_RETRACTS = 0.99  # cosine between a last move and the tool axis
 
 
 @dataclass(slots=True)
@@ -48,6 +50,8 @@ class MoveList:
         Millimetres in one unit of the file, as far as it is known.
     poses
         (first row, (4, 4) motion to the part frame in the unit of the file) where a stated frame is to be applied.
+    per_turn
+        How many cuts have a feed per revolution that nothing makes one in mm/min.
     """
 
     path: Path
@@ -63,6 +67,7 @@ class MoveList:
     frame_since: int = 0
     tally: Tally = field(default_factory=Tally)
     chosen_tools: list[tuple[int, Event]] = field(default_factory=list)
+    per_turn: int = 0
 
     def __post_init__(self) -> None:
         if self.unit_option is not None:
@@ -98,6 +103,34 @@ class MoveList:
             return None
         x, y, z = self.rows[-_COLUMNS : 3 - _COLUMNS]
         return (x, y, z)
+
+    def cuts_since(self, first: int) -> int:
+        """Return how many moves are cuts, from that one on."""
+        return self.rows[first * _COLUMNS + 7 :: _COLUMNS].count(0.0)
+
+    def note_missing_end(self, line: int, *, torn: bool = False) -> None:
+        """Note that no statement ends the program: a warning if it ends in a cut.
+
+        Parameters
+        ----------
+        line
+            The last line.
+        torn
+            True if the last statement moves the tool and not even its line has an end.
+        """
+        detail = ", whose line has no end either" if torn else ""
+        self.tally.note(Notice.END_MISSING, line, detail, grave=torn or self._ends_in_a_cut())
+
+    def _ends_in_a_cut(self) -> bool:
+        """Say whether the last move is neither rapid nor straight off the part along the tool axis."""
+        if not len(self) or self.rows[-2]:
+            return False
+        if len(self) == 1:
+            return True
+        x, y, z, i, j, k = self.rows[-_COLUMNS:-3]
+        a, b, c = self.rows[-2 * _COLUMNS : 3 - 2 * _COLUMNS]
+        travel = (x - a, y - b, z - c)
+        return not dot(travel, (i, j, k)) > _RETRACTS * norm(travel) * norm((i, j, k))
 
     def change_frame(self, T: FloatArray) -> None:
         """Apply a motion to all moves from here on; where the tool is in the new frame is not known."""
@@ -236,7 +269,8 @@ class MoveList:
     ) -> FloatArray:
         missing = ~rapid & (feeds == 0.0)
         if feed_mm_min is None and missing.any():
-            self.tally.note(Notice.FEED_MISSING, int(lines[missing][0]), count=int(missing.sum()))
+            detail = f" that is known in mm/min ({_PER_TURN.format(self.per_turn)})" if self.per_turn else ""
+            self.tally.note(Notice.FEED_MISSING, int(lines[missing][0]), detail, int(missing.sum()))
         bad = ~np.isfinite(feeds)
         if bad.any():
             raise self.error("the feed is too large to be a number; correct it", int(lines[bad][0]))

@@ -22,6 +22,7 @@ from sicp_formats.pcd.header import PADDING, Header, parse_header
 from sicp_formats.pcd.writer import write_scan
 from sicp_formats.source import describe, read_bytes
 from sicp_formats.surfaces.checks import Code, check_registrable, coarse_singles, origin_points
+from sicp_formats.surfaces.ending import without_cut_line
 from sicp_formats.surfaces.point_rows import OR_REPAIR, PointNames, point_names, point_rows
 from sicp_formats.surfaces.unit import chosen_unit
 
@@ -71,7 +72,11 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
     findings += _said_of_sensor(path, header)
     names, found = _names(path, header, limits, len(content), recover=recover)
     findings += found
-    values, place, found = read_rows(path, content, header, limits, recover=recover)
+    kept = content
+    if header.encoding == "ascii":
+        kept, found = without_cut_line(path, content, recover=recover, begin=header.body_byte)
+        findings += found
+    values, place, found = read_rows(path, kept, header, limits, recover=recover)
     findings += found
     scalars = _with_colours(values)
     names = _unpacked_names(names, scalars)

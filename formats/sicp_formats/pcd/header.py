@@ -100,7 +100,7 @@ def parse_header(path: Path, content: bytes, limits: Limits) -> Header:
         position = end + 1 if end >= 0 else len(content)
         text = raw.strip()
         if text.startswith(b"#"):
-            unit = unit_in(path, text.lstrip(b"#").split(), number, unit)
+            unit = unit_in(path, text.lstrip(b"#").decode("utf-8", "replace"), number, unit)
         elif text:
             _take(path, text, number, keys, lines)
     return _header(path, keys, lines, position, number + 1, unit)

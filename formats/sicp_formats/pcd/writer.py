@@ -9,6 +9,7 @@ import numpy as np
 from sicp_cam.errors import JobError
 from sicp_cam.model import Scan
 from sicp_cam.units import mm_per_unit
+from sicp_formats.source import unit_to_state
 from sicp_formats.surfaces.names import written_names
 
 __all__ = ["write_scan"]
@@ -50,7 +51,8 @@ def write_scan(scan: Scan, *, unit: str = "mm", data: Literal["binary", "ascii"]
     normals = [] if scan.normals is None else [scan.normals]
     names = (*_XYZ, *(_NORMAL if normals else ()), *written_names(scan.columns, _TAKEN))
     rows = np.column_stack([scan.points_mm / mm_per_unit(unit), *normals, *scan.columns.values()])
-    lines = ["# .PCD v0.7 - Point Cloud Data file format", f"# unit {unit}", "VERSION 0.7"]
+    stated = unit_to_state(scan.source, unit)
+    lines = ["# .PCD v0.7 - Point Cloud Data file format", *([f"# unit {stated}"] if stated else []), "VERSION 0.7"]
     lines += [f"FIELDS {' '.join(names)}"]
     lines += [
         f"{key} {' '.join([value] * len(names))}" for key, value in (("SIZE", "8"), ("TYPE", "F"), ("COUNT", "1"))

@@ -25,14 +25,18 @@ from sicp_formats.ply.header import Element, Header, parse_header
 from sicp_formats.ply.table import Table
 from sicp_formats.ply.wanted import Wanted, wanted
 from sicp_formats.ply.writer import write_part, write_scan
-from sicp_formats.source import describe, read_bytes
-from sicp_formats.surfaces.checks import Code, check_registrable, coarse_singles, origin_points
+from sicp_formats.source import LongFile, describe, read_bytes
+from sicp_formats.surfaces.checks import Code, check_registrable, coarse_singles, no_return_points
+from sicp_formats.surfaces.ending import without_cut_line
 from sicp_formats.surfaces.meshes import drop_collapsed, keep_points, merge_mesh
 from sicp_formats.surfaces.point_rows import PointRows, locked, point_rows
 from sicp_formats.surfaces.unit import chosen_unit
 from sicp_formats.tables.body import TextBody
 
 __all__ = ["read_part", "read_scan", "write_part", "write_scan"]
+
+_LONG_BYTES = 2**22
+"""Size from which a binary file is read in places."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +62,7 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
         Caps on what the file may ask for.
     recover
         True to drop points that are not finite with the faces on them, faces that point nowhere, and what is missing
-        of a file that is cut short, and to ignore normals in part. Each is a finding.
+        of the last element of a file that is cut short, and to ignore normals in part. Each is a finding.
 
     Returns
     -------
@@ -93,16 +97,44 @@ def read_part(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
 
 def _read(path: Path, units: str | None, limits: Limits, recover: bool) -> tuple[_Surface, Source]:
     mm_per_unit("mm" if units is None else units)
-    content = read_bytes(path, limits)
-    header = parse_header(path, content, limits)
+    content, header = _opened(path, limits)
     unit, stated, findings = chosen_unit(path, header.unit, units)
     read = wanted(path, header, len(content), limits, recover=recover)
     with ThreadPoolExecutor(1) as beside:  # the hash takes as long as all the rest
         source = beside.submit(describe, path, content, format="PLY", unit=unit, unit_stated=stated)
-        tables, found = _read_body(path, content, header, read, limits, recover)
-        surface = _surface(path, tables, read, mm_per_unit(unit), limits, recover)
+        kept: bytes | LongFile = content
+        if isinstance(content, bytes) and not header.byte_order and header.elements[-1].name == "vertex":
+            kept, cut = without_cut_line(path, content, recover=recover, begin=header.body_byte)
+            findings += cut
+        tables, found = _read_body(path, kept, header, read, limits, recover)
+        try:
+            surface = _surface(path, tables, read, mm_per_unit(unit), limits, recover)
+        except FormatError as error:
+            raise _blaming_counts(path, error, found) from None
     findings += read.findings + found + surface.findings
     return replace(surface, findings=findings), source.result()
+
+
+def _blaming_counts(path: Path, error: FormatError, found: tuple[Finding, ...]) -> FormatError:
+    """Return the error with what stands behind the declared rows, if anything does: the cause is there then."""
+    for each in found:
+        if each.code == Code.TRAILING_BYTES:
+            behind = each.message.split(";")[0]
+            what = f"{error.what}; there are {behind}, so its counts are probably wrong"
+            return FormatError(path, what, line=error.line, byte=error.byte)
+    return error
+
+
+def _opened(path: Path, limits: Limits) -> tuple[bytes | LongFile, Header]:
+    """Return a file and its header: a long one that is binary to be read in places, any other one as its bytes."""
+    if path.suffix.lower() != ".gz":
+        file = LongFile(path, limits)
+        # All that the parser of the header looks at, whatever the size of the file.
+        header = parse_header(path, file.head(limits.header_bytes + 1), limits)
+        if header.byte_order and len(file) >= _LONG_BYTES:
+            return file, header
+    content = read_bytes(path, limits)
+    return content, parse_header(path, content, limits)
 
 
 def _surface(
@@ -114,7 +146,7 @@ def _surface(
     findings += found
     points, normals, columns = rows.points_mm, rows.normals, rows.columns
     if faces is None:
-        findings += origin_points(path, points)
+        findings += no_return_points(path, rows.at_origin)
     else:
         points, normals, faces, columns, found = merge_mesh(path, points, normals, faces, columns)
         findings += found
@@ -143,6 +175,12 @@ def _faces(
         parts.append(triangles)
         findings += found
     faces: IntArray | None = parts[1] if len(parts) == 2 else np.concatenate(parts)
+    rows_of_faces = sum(tables[element].rows for element in read.corners)
+    if rows_of_faces and not sum(map(len, parts)) and all(each.code != Code.FACES_DROPPED for each in findings):
+        what = (
+            f"none of the {rows_of_faces} faces has 3 corners; a count of the header is wrong, or the file is damaged"
+        )
+        raise FormatError(path, what)
     if rows.kept is not None:
         kept = np.zeros(vertices, np.bool_)
         kept[rows.kept] = True
@@ -154,26 +192,31 @@ def _faces(
 
 
 def _read_body(
-    path: Path, content: bytes, header: Header, read: Wanted, limits: Limits, recover: bool
+    path: Path, content: bytes | LongFile, header: Header, read: Wanted, limits: Limits, recover: bool
 ) -> tuple[dict[str, Table], tuple[Finding, ...]]:
     tables: dict[str, Table] = {}
     findings: list[Finding] = []
     position = header.body_byte
-    body = None if header.byte_order else ply_ascii.text_body(path, content, header, limits, recover=recover)
-    for element in header.elements:
+    body = (
+        ply_ascii.text_body(path, content, header, limits, recover=recover)
+        if isinstance(content, bytes) and not header.byte_order
+        else None
+    )
+    for number, element in enumerate(header.elements):
         names = read.of(element.name)
+        last = not any(behind.count for behind in header.elements[number + 1 :])
         # One list holds all strips; its triangles are counted afterwards.
         caps = limits if element.name != "tristrips" else replace(limits, list_length=len(content))
         if body is None:
             table, position = ply_binary.read_element(
-                path, content, position, element, header.byte_order, names, caps, recover=recover
+                path, content, position, element, header.byte_order, names, caps, recover=recover, last=last
             )
             end = f"{path}, byte {position}"
             if table.rows < element.count:
                 position = len(content)
         else:
             left, end = len(content) - position, f"{path}, line {element.line}"
-            table = ply_ascii.read_element(path, body, left, element, names, caps, recover=recover)
+            table = ply_ascii.read_element(path, body, left, element, names, caps, recover=recover and last)
         tables[element.name] = table
         findings += _told(path, element, table, end, used=bool(names))
     findings += _bytes_behind(path, content, position) if body is None else _rows_behind(path, body)
@@ -192,7 +235,7 @@ def _told(path: Path, element: Element, table: Table, end: str, *, used: bool) -
     return findings
 
 
-def _bytes_behind(path: Path, content: bytes, position: int) -> list[Finding]:
+def _bytes_behind(path: Path, content: bytes | LongFile, position: int) -> list[Finding]:
     if position == len(content):
         return []
     message = f"{len(content) - position} more bytes than the header declares; they were not read"

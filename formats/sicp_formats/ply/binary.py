@@ -15,14 +15,16 @@ from sicp_cam.limits import Limits
 from sicp_cam.model import IntArray
 from sicp_formats.ply.header import Element
 from sicp_formats.ply.table import Block, Table, gather
+from sicp_formats.source import LongFile
 from sicp_formats.surfaces.point_rows import OR_REPAIR
+from sicp_formats.surfaces.row_blocks import RowsInFile
 
 __all__ = ["read_element"]
 
 
 def read_element(
     path: Path,
-    content: bytes,
+    content: bytes | LongFile,
     begin: int,
     element: Element,
     byte_order: str,
@@ -30,8 +32,13 @@ def read_element(
     limits: Limits,
     *,
     recover: bool = False,
+    last: bool = True,
 ) -> tuple[Table, int]:
     """Read the rows of one element; those that are there as a whole, to recover a file that is cut short.
+
+    Only the `last` element with rows is recovered: where others follow, their rows would be taken for those missing.
+
+    Rows of a fixed size are left in a long file until they are needed; to find others, it is read as a whole.
 
     Returns
     -------
@@ -46,24 +53,29 @@ def read_element(
     """
     smallest = sum(np.dtype(each.count_code or each.code).itemsize for each in element.properties)
     left, count = len(content) - begin, element.count
+    recover = recover and last
     if count * smallest > left:
         if not recover:
             what = (
                 f"element {element.name} declares {count} x {smallest} B, {left} B present; the file is cut short: "
-                f"copy it again{OR_REPAIR}"
+                f"copy it again{OR_REPAIR if last else ''}"
             )
             raise FormatError(path, what, byte=begin)
         count = left // smallest
     if count == 0:
         return gather(element, 0, wanted, [], lambda _: {"byte": begin}), begin
     if all(each.count_code is None for each in element.properties):
-        return _equal_rows(content, begin, count, element, _row_type(element, byte_order, ()), wanted)
+        row_type = _row_type(element, byte_order, ())
+        if isinstance(content, LongFile):
+            return _rows_in_file(content, begin, count, element, row_type, wanted)
+        return _equal_rows(content, begin, count, element, row_type, wanted)
+    content = content.whole() if isinstance(content, LongFile) else content
     walk = _Walk(path, content, element, byte_order, limits.list_length if wanted else len(content))
-    if wanted and (row_type := walk.common_type(begin)) is not None:
-        whole = min(count, left // row_type.itemsize)
-        cut = recover and whole < count and walk.cut_at(begin + whole * row_type.itemsize)
-        if (whole == count or cut) and _all_alike(content, begin, whole, element, row_type):
-            return _equal_rows(content, begin, whole, element, row_type, wanted)
+    if wanted and (common_type := walk.common_type(begin)) is not None:
+        whole = min(count, left // common_type.itemsize)
+        cut = recover and whole < count and walk.cut_at(begin + whole * common_type.itemsize)
+        if (whole == count or cut) and _all_alike(content, begin, whole, element, common_type):
+            return _equal_rows(content, begin, whole, element, common_type, wanted)
     return _differing_rows(begin, count, element, wanted, walk, recover=recover)
 
 
@@ -152,6 +164,15 @@ def _equal_rows(
     size = row_type.itemsize
     blocks: list[Block] = [(slice(None), _columns(element, np.frombuffer(content, row_type, count, begin)))]
     return gather(element, count, wanted, blocks, lambda row: {"byte": begin + row * size}), begin + count * size
+
+
+def _rows_in_file(
+    file: LongFile, begin: int, count: int, element: Element, row_type: np.dtype[Any], wanted: Sequence[str]
+) -> tuple[Table, int]:
+    size = row_type.itemsize
+    fields = {each.name: f"value{index}" for index, each in enumerate(element.properties) if each.name in wanted}
+    rows = RowsInFile(file, begin, count, row_type, fields)
+    return Table(count, rows, {}, lambda row: {"byte": begin + row * size}), begin + count * size
 
 
 def _differing_rows(

@@ -89,9 +89,9 @@ def parse_header(path: Path, content: bytes, limits: Limits) -> Header:
     lines = _header_lines(path, content, limits)
     for number, words, end in lines:
         match words:
-            case [b"comment", *comment]:
-                unit = unit_in(path, comment, number, unit)
-            case [b"obj_info", *_] | []:
+            case [b"comment" | b"obj_info", *comment]:
+                unit = unit_in(path, _text(b" ".join(comment)), number, unit)
+            case []:
                 continue
             case [b"end_header"]:
                 if byte_order is None:

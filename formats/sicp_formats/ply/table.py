@@ -12,6 +12,7 @@ import numpy.typing as npt
 from sicp_cam.model import IntArray
 from sicp_formats.ply.header import Element
 from sicp_formats.surfaces.checks import Place
+from sicp_formats.surfaces.row_blocks import RowBlocks, Scalars
 
 __all__ = ["Block", "Table", "gather"]
 
@@ -28,7 +29,8 @@ class Table:
     rows
         How many there are: fewer than declared where a file that is cut short is repaired.
     scalars
-        (n,) by property, of any number type; views of the file where its rows are all alike.
+        (n,) by property, of any number type; views of the file where its rows are all alike, or its rows themselves
+        where they are read later.
     lists
         By property: (n,) lengths, and all items one list behind the other.
     place
@@ -36,7 +38,7 @@ class Table:
     """
 
     rows: int
-    scalars: Mapping[str, npt.NDArray[Any]]
+    scalars: Scalars | RowBlocks
     lists: Mapping[str, tuple[IntArray, npt.NDArray[Any]]]
     place: Place
 

@@ -10,6 +10,7 @@ import numpy as np
 from sicp_cam.errors import JobError
 from sicp_cam.model import FloatArray, IntArray, Part, Scan
 from sicp_cam.units import mm_per_unit
+from sicp_formats.source import unit_to_state
 from sicp_formats.surfaces.names import written_names
 
 __all__ = ["write_part", "write_scan"]
@@ -30,7 +31,7 @@ def write_scan(scan: Scan, *, unit: str = "mm", encoding: Encoding = "binary_lit
     scan
         The scan.
     unit
-        Unit of the coordinates, which a comment states: `comment unit mm`.
+        Unit of the coordinates, which a comment states, `comment unit mm`, unless that of the scan is not known.
     encoding
         How the rows are written.
 
@@ -49,7 +50,9 @@ def write_scan(scan: Scan, *, unit: str = "mm", encoding: Encoding = "binary_lit
     >>> write_scan(Scan(np.eye(3)), encoding="ascii").decode().splitlines()[-1]
     '0.0 0.0 1.0'
     """
-    return _encoded(scan.points_mm, scan.normals, scan.columns, scan.faces, unit, encoding)
+    return _encoded(
+        scan.points_mm, scan.normals, scan.columns, scan.faces, unit, unit_to_state(scan.source, unit), encoding
+    )
 
 
 def write_part(part: Part, *, unit: str = "mm", encoding: Encoding = "binary_little_endian") -> bytes:
@@ -72,7 +75,7 @@ def write_part(part: Part, *, unit: str = "mm", encoding: Encoding = "binary_lit
     mesh = part.mesh
     if not len(mesh.faces):
         raise JobError("the part has no triangles, and a PLY file of a part needs them; write it as a scan")
-    return _encoded(mesh.vertices_mm, mesh.normals, {}, mesh.faces, unit, encoding)
+    return _encoded(mesh.vertices_mm, mesh.normals, {}, mesh.faces, unit, unit_to_state(part.source, unit), encoding)
 
 
 def _encoded(
@@ -81,6 +84,7 @@ def _encoded(
     columns: Mapping[str, FloatArray],
     faces: IntArray | None,
     unit: str,
+    stated: str,
     encoding: Encoding,
 ) -> bytes:
     if encoding not in _ORDERS:
@@ -88,7 +92,8 @@ def _encoded(
     factor = mm_per_unit(unit)
     names = (*_XYZ, *(() if normals is None else _NORMAL), *written_names(columns, _TAKEN))
     rows = np.column_stack([points_mm / factor, *([] if normals is None else [normals]), *columns.values()])
-    lines = ["ply", f"format {encoding} 1.0", f"comment unit {unit}", f"element vertex {len(rows)}"]
+    lines = ["ply", f"format {encoding} 1.0", *([f"comment unit {stated}"] if stated else [])]
+    lines += [f"element vertex {len(rows)}"]
     lines += [f"property double {name}" for name in names]
     faces = np.zeros((0, 3), np.int64) if faces is None else faces
     if len(faces):

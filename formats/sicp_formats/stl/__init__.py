@@ -1,7 +1,8 @@
 """STL meshes as scans or nominal parts: binary and text, told apart by size, read strictly; and the writers.
 
-The formats are those of 3D Systems' "StereoLithography Interface Specification" (1989). They state no unit of length,
-and repeat each vertex for each triangle; vertices that are exactly equal are merged.
+The formats are those of 3D Systems' "StereoLithography Interface Specification" (1989). They state no unit of length;
+the writers state it in the name or header, `unit=mm`, which the readers follow. They repeat each vertex for each
+triangle; vertices that are exactly equal are merged.
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from sicp_cam.findings import Finding
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import FloatArray, IntArray, Part, Scan, Source, TriangleMesh
 from sicp_cam.units import mm_per_unit
-from sicp_formats.source import describe, read_bytes
+from sicp_formats.source import describe, read_bytes, unit_to_state
 from sicp_formats.stl import binary as stl_binary
 from sicp_formats.stl import text as stl_text
 from sicp_formats.stl.facets import Facets, against_winding, without_gaps
 from sicp_formats.surfaces.checks import check_coordinates, check_registrable, coarse_singles
 from sicp_formats.surfaces.meshes import drop_collapsed, equal_points
+from sicp_formats.surfaces.unit import chosen_unit
 
 __all__ = ["read_part", "read_scan", "write_part", "write_scan"]
 
@@ -43,7 +45,8 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
     path
         The file.
     units
-        Unit of its coordinates, one of `sicp_cam.units.MM_PER_UNIT`; millimetres are assumed if left out.
+        Unit of its coordinates, one of `sicp_cam.units.MM_PER_UNIT`; if left out, that of a header or name such as
+        `UNITS=mm`, or else millimetres.
     limits
         Caps on what the file may ask for.
     recover
@@ -61,7 +64,7 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
         If the file breaks its format, ends early, holds numbers that are not finite, or no triangle with an area;
         the message names the line or byte.
     UnitError
-        If the unit is unknown.
+        If the unit is unknown, or not the one that the file states.
     """
     mesh = _read(path, units, limits, recover)
     return Scan(mesh.vertices_mm, None, mesh.faces, mesh.source, mesh.findings)
@@ -108,7 +111,7 @@ def write_scan(scan: Scan, *, unit: str = "mm", encoding: Literal["binary", "asc
     loose = len(scan.points_mm) - len(np.unique(scan.faces))
     if loose:
         raise JobError(f"{loose} points belong to no triangle and an STL file cannot hold them; write it as .ply")
-    return _encoded(scan.points_mm, scan.faces, unit, encoding)
+    return _encoded(scan.points_mm, scan.faces, unit, unit_to_state(scan.source, unit), encoding)
 
 
 def write_part(part: Part, *, unit: str = "mm", encoding: Literal["binary", "ascii"] = "binary") -> bytes:
@@ -128,20 +131,21 @@ def write_part(part: Part, *, unit: str = "mm", encoding: Literal["binary", "asc
     """
     if not len(part.mesh.faces):
         raise JobError("an STL file holds triangles and the part has none")
-    return _encoded(part.mesh.vertices_mm, part.mesh.faces, unit, encoding)
+    return _encoded(part.mesh.vertices_mm, part.mesh.faces, unit, unit_to_state(part.source, unit), encoding)
 
 
 def _read(path: Path, units: str | None, limits: Limits, recover: bool) -> _Mesh:
-    unit = "mm" if units is None else units
-    factor = mm_per_unit(unit)
+    mm_per_unit("mm" if units is None else units)
     content = read_bytes(path, limits)
     binary = stl_binary.is_binary(content)
-    read_facets = stl_binary.read_facets if binary else stl_text.read_facets
-    facets = read_facets(path, content, limits, recover)
+    kind = stl_binary if binary else stl_text
+    facets = kind.read_facets(path, content, limits, recover)
+    unit, stated, found = chosen_unit(path, kind.stated_unit(path, content), units)
+    factor = mm_per_unit(unit)
     if recover:
         facets = without_gaps(path, facets)
     vertices, faces = _merged(path, facets, factor, limits)
-    findings = facets.findings
+    findings = found + facets.findings
     if facets.normals is not None:
         findings += against_winding(path, facets.normals, vertices, faces)
     faces, found = drop_collapsed(path, vertices, faces)
@@ -149,8 +153,7 @@ def _read(path: Path, units: str | None, limits: Limits, recover: bool) -> _Mesh
     check_registrable(path, vertices)
     if binary:
         findings += coarse_singles(path, vertices, factor)
-    kind = "STL binary" if binary else "STL ascii"
-    source = describe(path, content, format=kind, unit=unit, unit_stated=units is not None)
+    source = describe(path, content, format="STL binary" if binary else "STL ascii", unit=unit, unit_stated=stated)
     vertices.setflags(write=False)
     faces.setflags(write=False)
     return _Mesh(vertices, faces, source, findings)
@@ -168,7 +171,7 @@ def _merged(path: Path, facets: Facets, factor: float, limits: Limits) -> tuple[
     return corners[first].astype(np.float64) * factor, merged.reshape(-1, 3)
 
 
-def _encoded(vertices_mm: FloatArray, faces: IntArray, unit: str, encoding: str) -> bytes:
+def _encoded(vertices_mm: FloatArray, faces: IntArray, unit: str, stated: str, encoding: str) -> bytes:
     if encoding not in ("binary", "ascii"):
         raise JobError(f"encoding: there is no {encoding!r} STL; use binary or ascii")
     vertices = vertices_mm / mm_per_unit(unit)
@@ -177,5 +180,5 @@ def _encoded(vertices_mm: FloatArray, faces: IntArray, unit: str, encoding: str)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.where(lengths > 0.0, lengths, 1.0)
     if encoding == "ascii":
-        return stl_text.encode(vertices, faces, normals)
-    return stl_binary.encode(vertices, faces, normals)
+        return stl_text.encode(vertices, faces, normals, stated)
+    return stl_binary.encode(vertices, faces, normals, stated)

@@ -13,13 +13,14 @@ from sicp_cam.limits import Limits
 from sicp_cam.model import FloatArray, IntArray
 from sicp_formats.stl.facets import Facets, check_limit
 from sicp_formats.surfaces.checks import Code
+from sicp_formats.surfaces.unit import StatedUnit, unit_in
 
-__all__ = ["encode", "is_binary", "read_facets"]
+__all__ = ["encode", "is_binary", "read_facets", "stated_unit"]
 
 _HEADER_BYTES = 84
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _UTF8_MARK = b"\xef\xbb\xbf"
-_TITLE = b"binary STL, mm"  # must not begin with solid
+_TITLE = "binary STL"  # must not begin with solid
 
 
 def is_binary(content: bytes) -> bool:
@@ -63,12 +64,18 @@ def read_facets(path: Path, content: bytes, limits: Limits, recover: bool) -> Fa
     return Facets(corners.reshape(-1, 3), place, facets["normal"], findings)
 
 
-def encode(vertices: FloatArray, faces: IntArray, normals: FloatArray) -> bytes:
-    """Return triangles as a binary file; `normals` are one for each triangle."""
+def stated_unit(path: Path, content: bytes) -> StatedUnit | None:
+    """Return the unit that the header states, as in `UNITS=mm`; None if it does not."""
+    return unit_in(path, content[:80].split(b"\0", 1)[0].decode("latin-1"), 0, title=True)
+
+
+def encode(vertices: FloatArray, faces: IntArray, normals: FloatArray, unit: str) -> bytes:
+    """Return triangles as a binary file; `normals` are one for each triangle, `unit` is stated unless it is empty."""
     facets = np.zeros(len(faces), _FACET)
     facets["normal"] = normals
     facets["corners"] = vertices[faces]
-    return _TITLE.ljust(80) + len(faces).to_bytes(4, "little") + facets.tobytes()
+    title = f"{_TITLE}, unit={unit}" if unit else _TITLE
+    return title.encode("ascii").ljust(80) + len(faces).to_bytes(4, "little") + facets.tobytes()
 
 
 def _declared(content: bytes) -> int:

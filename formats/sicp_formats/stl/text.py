@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,11 +13,14 @@ from sicp_cam.model import FloatArray, IntArray
 from sicp_formats.stl.facets import Facets, check_limit
 from sicp_formats.stl.regular import regular_corners
 from sicp_formats.surfaces.checks import Code
+from sicp_formats.surfaces.unit import StatedUnit, unit_in
 from sicp_formats.tables.rows import Row, numbers, text_lines
 
-__all__ = ["encode", "read_facets"]
+__all__ = ["encode", "read_facets", "stated_unit"]
 
 _UTF8_MARK = b"\xef\xbb\xbf"
+_TITLE = re.compile(rb"^[ \t]*(?:solid|#)([^\r\n]{0,999})", re.IGNORECASE | re.MULTILINE)
+_TITLE_BYTES = 2**16
 _NEXT = {b"solid": b"facet", b"facet": b"outer", b"outer": b"vertex", b"endloop": b"endfacet", b"endfacet": b"facet"}
 
 
@@ -47,15 +51,42 @@ def read_facets(path: Path, content: bytes, limits: Limits, recover: bool) -> Fa
     return Facets(corners, lambda row: {"line": int(lines[row])}, findings=tuple(findings))
 
 
-def encode(vertices: FloatArray, faces: IntArray, normals: FloatArray) -> bytes:
-    """Return triangles as a text with all digits of each number; `normals` are one for each triangle."""
+def stated_unit(path: Path, content: bytes) -> StatedUnit | None:
+    """Return the unit that the name of a solid or a comment at the beginning states; None if none does.
+
+    Raises
+    ------
+    FormatError
+        If they state two.
+    """
+    unit = None
+    head = content[:_TITLE_BYTES].replace(b"\r\n", b"\n").replace(b"\r", b"\n").removeprefix(_UTF8_MARK)
+    for match in _TITLE.finditer(head):
+        line = head.count(b"\n", 0, match.start()) + 1
+        unit = unit_in(path, match[1].decode("utf-8", "replace"), line, unit, title=True)
+    return unit
+
+
+def encode(vertices: FloatArray, faces: IntArray, normals: FloatArray, unit: str) -> bytes:
+    """Return triangles as a text with all digits of each number.
+
+    Parameters
+    ----------
+    vertices, faces
+        The triangles.
+    normals
+        One for each triangle.
+    unit
+        Unit of the vertices, which the name of the solid states; "" to state none.
+    """
     words = [" ".join(map(repr, row)) for row in vertices.tolist()]
     sides = [" ".join(map(repr, row)) for row in normals.tolist()]
     facets = [
         f"facet normal {side}\nouter loop\nvertex {words[a]}\nvertex {words[b]}\nvertex {words[c]}\nendloop\nendfacet\n"
         for side, (a, b, c) in zip(sides, faces.tolist(), strict=True)
     ]
-    return "".join(["solid mesh in mm\n", *facets, "endsolid mesh in mm\n"]).encode("ascii")
+    name = f"mesh unit={unit}" if unit else "mesh"
+    return "".join([f"solid {name}\n", *facets, f"endsolid {name}\n"]).encode("ascii")
 
 
 def _without_cut_line(content: bytes) -> bytes:

@@ -22,7 +22,10 @@ __all__ = [
     "check_coordinates",
     "check_registrable",
     "coarse_singles",
+    "count_at_origin",
+    "no_return_points",
     "origin_points",
+    "rows_not_unit",
     "unit_normals",
 ]
 
@@ -32,7 +35,7 @@ Place = Callable[[int], Mapping[str, int]]
 _UNIT_TOLERANCE = 1e-6
 _DOUBTFUL_LENGTH = 0.05
 _COARSE_MM = 0.005
-_BLOCK_ROWS = 8192
+_BLOCK_ROWS = 16384
 """Rows looked at once, so that what is in between stays in the cache."""
 
 
@@ -50,7 +53,6 @@ class Code(IntEnum):
     NORMALS_AGAINST_WINDING = 109
     COLUMNS_NOT_USED = 110
     LINES_SKIPPED = 111
-    UNIT_OVERRULED = 112
     COLUMNS_PROVEN = 120
     SENSOR_POSE_NOT_APPLIED = 130
     NO_RETURN = 131
@@ -65,7 +67,10 @@ class Code(IntEnum):
     ROWS_DROPPED = 150
     COUNT_REPLACED = 151
     SCAN_CUT = 152
+    LAST_LINE_CUT = 153
+    MARKS_MAY_BE_THOUSANDS = 154
     NORMALS_BLANKED = 155
+    MATRIX_NOT_RIGID = 156
     FACETS_MISCOUNTED = 160
     FACETS_CUT = 161
     FACETS_DROPPED = 162
@@ -98,16 +103,24 @@ def check_registrable(path: Path, points_mm: FloatArray) -> None:
         raise FormatError(path, f"all {len(points_mm)} points are {kind} and cannot register; export the whole scan")
 
 
-def unit_normals(path: Path, normals: FloatArray, place: Place) -> tuple[FloatArray, tuple[Finding, ...]]:
+def unit_normals(
+    path: Path, normals: FloatArray, place: Place, rows: IntArray | None = None
+) -> tuple[FloatArray, tuple[Finding, ...]]:
     """Scale normals to length one; those of length zero stay zero, those already of length one stay as they are.
+
+    Parameters
+    ----------
+    path, normals, place
+        The file, the normals (n, 3), and where they stand in it.
+    rows
+        What `rows_not_unit` tells of them, if that is known.
 
     Raises
     ------
     FormatError
         If a normal is not finite.
     """
-    with np.errstate(over="ignore", invalid="ignore"):
-        rows = _not_unit(normals)
+    rows = rows_not_unit(normals) if rows is None else rows
     finite = np.isfinite(normals[rows]).all(axis=1)
     if not finite.all():
         what = "the normal is not finite; remove it in the scanner's software and export again"
@@ -128,6 +141,24 @@ def unit_normals(path: Path, normals: FloatArray, place: Place) -> tuple[FloatAr
     return normals, (Finding(Code.NORMALS_NOT_UNIT, Level.INFO, message, str(path)),)
 
 
+def rows_not_unit(normals: FloatArray) -> IntArray:
+    """Return the rows of normals (n, 3) whose length is not one, or no number.
+
+    >>> rows_not_unit(np.array([[0.0, 1, 0], [0, 2, 0], [np.nan, 1, 0]])).tolist()
+    [1, 2]
+    """
+    found = [np.zeros(0, np.int64)]
+    for first in range(0, len(normals), _BLOCK_ROWS):
+        x, y, z = normals[first : first + _BLOCK_ROWS].T
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = x * x
+            squares += y * y
+            squares += z * z
+            if not 1.0 - 2 * _UNIT_TOLERANCE <= squares.min() <= squares.max() <= 1.0 + 2 * _UNIT_TOLERANCE:
+                found.append(first + np.flatnonzero(~(np.abs(squares - 1.0) <= 2 * _UNIT_TOLERANCE)))
+    return np.concatenate(found)
+
+
 def coarse_singles(path: Path, points_mm: FloatArray, mm_per_unit: float) -> tuple[Finding, ...]:
     """Warn where coordinates stored as 32-bit floats are so large that their rounding matters."""
     largest = max(points_mm.max(), -points_mm.min())
@@ -140,25 +171,21 @@ def coarse_singles(path: Path, points_mm: FloatArray, mm_per_unit: float) -> tup
 
 def origin_points(path: Path, points_mm: FloatArray) -> tuple[Finding, ...]:
     """Warn of several points at exactly 0 0 0, which many scanners write for a ray that came back from nowhere."""
+    return no_return_points(path, count_at_origin(points_mm))
+
+
+def count_at_origin(points_mm: FloatArray) -> int:
+    """Return how many points lie at exactly 0 0 0."""
     candidates = np.flatnonzero(points_mm[:, 0] == 0.0)
-    count = int((points_mm[candidates] == 0.0).all(axis=1).sum())
+    return int((points_mm[candidates] == 0.0).all(axis=1).sum())
+
+
+def no_return_points(path: Path, count: int) -> tuple[Finding, ...]:
+    """Warn, as `origin_points` does, of so many points at exactly 0 0 0."""
     if count < 2:
         return ()
     message = f"{count} points lie at exactly 0 0 0, as scanners write them for 'no return'; remove them if they are"
     return (Finding(Code.ORIGIN_POINTS, Level.WARN, message, str(path)),)
-
-
-def _not_unit(normals: FloatArray) -> IntArray:
-    """Return the rows whose length is not one, or no number."""
-    found = [np.zeros(0, np.int64)]
-    for first in range(0, len(normals), _BLOCK_ROWS):
-        x, y, z = normals[first : first + _BLOCK_ROWS].T
-        squares = x * x
-        squares += y * y
-        squares += z * z
-        if not 1.0 - 2 * _UNIT_TOLERANCE <= squares.min() <= squares.max() <= 1.0 + 2 * _UNIT_TOLERANCE:
-            found.append(first + np.flatnonzero(~(np.abs(squares - 1.0) <= 2 * _UNIT_TOLERANCE)))
-    return np.concatenate(found)
 
 
 def _on_one_line(points: FloatArray) -> bool:

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,17 +19,28 @@ from sicp_cam.errors import FormatError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import Limits
 from sicp_cam.model import BoolArray, FloatArray, IntArray
-from sicp_formats.surfaces.checks import Code, Place, check_coordinates, unit_normals
+from sicp_formats.surfaces.checks import (
+    Code,
+    Place,
+    check_coordinates,
+    count_at_origin,
+    rows_not_unit,
+    unit_normals,
+)
+from sicp_formats.surfaces.row_blocks import BLOCK_ROWS, ColumnsInMemory, RowBlocks, Scalars
 
 __all__ = ["OR_REPAIR", "PointNames", "PointRows", "locked", "point_names", "point_rows", "where"]
-
-Scalars: TypeAlias = Mapping[str, npt.NDArray[Any]]
 
 OR_REPAIR = ", or repair it with --recover"
 """Ends the message of an error that a repair would cure."""
 
 _AXES = ("x", "y", "z")
-_BLOCK_ROWS = 16384
+_WORKERS = 2
+_PARTS = 8
+"""Parts that the rows are split into: few, since to begin one costs time; enough for both workers to end at about the
+same time, and to use the rows up in about their order."""
+_LEAST_BLOCKS = 8
+"""Blocks of the smallest part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +67,8 @@ class PointRows:
         (m,) rows of the file that these are, None for all.
     low_mm, high_mm
         Smallest and largest coordinate.
+    at_origin
+        How many lie at exactly 0 0 0.
     """
 
     points_mm: FloatArray
@@ -63,6 +77,26 @@ class PointRows:
     kept: IntArray | None
     low_mm: float
     high_mm: float
+    at_origin: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Arrays:
+    """Points in mm, normals and columns as the file has them, to be filled."""
+
+    points: FloatArray
+    normals: FloatArray | None
+    columns: Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What was seen of some rows: extremes, nan if one is nan; points at 0 0 0; rows of normals that are not unit."""
+
+    low: float
+    high: float
+    at_origin: int
+    not_unit: IntArray
 
 
 def point_names(names: Sequence[str]) -> PointNames:
@@ -85,7 +119,7 @@ def _first_known(names: Sequence[str], spellings: Sequence[tuple[str, ...]]) -> 
 
 def point_rows(
     path: Path,
-    scalars: Scalars,
+    scalars: Scalars | RowBlocks,
     names: PointNames,
     place: Place,
     mm: float,
@@ -101,7 +135,7 @@ def point_rows(
     path, place
         The file, and where its rows stand in it, for messages.
     scalars
-        (n,) numbers by name, all that `names` names.
+        (n,) numbers by name, all that `names` names; or the rows of them.
     names
         All three coordinates; all three of the normal, or none that counts.
     mm
@@ -118,24 +152,25 @@ def point_rows(
     FormatError
         If a coordinate or a normal is not finite, or a coordinate beyond `limits.coordinate_mm`.
     """
-    with ThreadPoolExecutor(1) as beside:  # NumPy's conversions do not hold the interpreter
-        stacked = None if None in names.normal else beside.submit(_stacked, scalars, names.normal, 1.0)
-        points, low, high = _stacked(scalars, names.xyz, mm)
+    arrays, seen = _converted(ColumnsInMemory(scalars) if isinstance(scalars, Mapping) else scalars, names, mm)
+    points, normals, columns, not_unit = arrays.points, arrays.normals, arrays.columns, seen.not_unit
+    low, high = seen.low, seen.high
     findings: tuple[Finding, ...] = ()
     kept: IntArray | None = None
     if not (np.isfinite(low) and np.isfinite(high)):
         kept, findings = _finite_rows(path, points, place, recover=recover, no_return=no_return)
         points, place = points[kept], _places_of(kept, place)
+        normals = None if normals is None else normals[kept]
+        columns = {name: values[kept] for name, values in columns.items()}
+        not_unit = not_unit if normals is None else rows_not_unit(normals)
         low, high = points.min(initial=np.inf), points.max(initial=-np.inf)
     if len(points) and not -limits.coordinate_mm <= low <= high <= limits.coordinate_mm:
         check_coordinates(path, points, place, limits)
-    normals = None
-    if stacked is not None:
-        normals, found = _normals(path, _rows(stacked.result()[0], kept), place, recover=recover)
+    if normals is not None:
+        normals, found = _normals(path, normals, not_unit, place, recover=recover)
         normals, findings = locked(normals), findings + found
-    with np.errstate(invalid="ignore"):
-        columns = {name: locked(_rows(scalars[name], kept).astype(np.float64)) for name in names.further}
-    return PointRows(locked(points), normals, columns, kept, float(low), float(high)), findings
+    columns = {name: locked(values) for name, values in columns.items()}
+    return PointRows(locked(points), normals, columns, kept, float(low), float(high), seen.at_origin), findings
 
 
 def where(path: Path, place: Mapping[str, int]) -> str:
@@ -155,21 +190,50 @@ def locked(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return values
 
 
-def _stacked(scalars: Scalars, names: Sequence[str | None], factor: float) -> tuple[FloatArray, float, float]:
-    """Return columns side by side as doubles, times a factor; and the smallest and largest, nan if one is nan."""
-    columns = [scalars[name] for name in names if name is not None]
-    values = np.empty((len(columns[0]), len(columns)))
-    lows, highs = [np.inf], [-np.inf]
+def _converted(rows: RowBlocks, names: PointNames, mm: float) -> tuple[_Arrays, _Seen]:
+    """Return all rows as doubles, the points in mm, and what was seen of them on the way."""
+    count = len(rows)
+    normals = None if None in names.normal else np.empty((count, 3))
+    arrays = _Arrays(np.empty((count, 3)), normals, {name: np.empty(count) for name in names.further})
+    bounds = [*range(0, count, max(_LEAST_BLOCKS * BLOCK_ROWS, -(-count // _PARTS))), count]
+    with ThreadPoolExecutor(_WORKERS) as pool:  # NumPy's conversions do not hold the interpreter
+        parts = [pool.submit(_convert, rows, begin, end, names, mm, arrays) for begin, end in pairwise(bounds)]
+        seen = [part.result() for part in parts]
+    return arrays, _together(seen)
+
+
+def _convert(rows: RowBlocks, begin: int, end: int, names: PointNames, mm: float, arrays: _Arrays) -> _Seen:
+    """Convert the rows from `begin` to `end`, and look at each block while it is in the cache."""
+    seen = []
     with np.errstate(invalid="ignore", over="ignore"):  # a signalling nan; whoever calls tells its place
-        for first in range(0, len(values), _BLOCK_ROWS):
-            block = values[first : first + _BLOCK_ROWS]
-            for index, column in enumerate(columns):
-                block[:, index] = column[first : first + _BLOCK_ROWS]
-            if factor != 1.0:
-                block *= factor
-            lows.append(block.min())
-            highs.append(block.max())
-    return values, float(np.min(lows)), float(np.max(highs))
+        for block in rows.blocks(begin, end):
+            points = _fill(arrays.points[begin:end], block, names.xyz)
+            if mm != 1.0:
+                points *= mm
+            not_unit = np.zeros(0, np.int64)
+            if arrays.normals is not None:
+                not_unit = begin + rows_not_unit(_fill(arrays.normals[begin:end], block, names.normal))
+            for name, values in arrays.columns.items():
+                values[begin : begin + len(points)] = block[name]
+            seen.append(_Seen(points.min(), points.max(), count_at_origin(points), not_unit))
+            begin += len(points)
+    return _together(seen)
+
+
+def _fill(target: FloatArray, block: Scalars, names: Sequence[str | None]) -> FloatArray:
+    """Put columns side by side at the beginning of an array, and return the rows that were filled."""
+    for index, name in enumerate(names):
+        if name is not None:
+            target = target[: len(block[name])]
+            target[:, index] = block[name]
+    return target
+
+
+def _together(seen: Sequence[_Seen]) -> _Seen:
+    low = np.min([each.low for each in seen], initial=np.inf)
+    high = np.max([each.high for each in seen], initial=-np.inf)
+    not_unit = np.concatenate([np.zeros(0, np.int64), *(each.not_unit for each in seen)])
+    return _Seen(float(low), float(high), sum(each.at_origin for each in seen), not_unit)
 
 
 def _finite_rows(
@@ -194,23 +258,20 @@ def _finite_rows(
     return np.flatnonzero(finite), tuple(findings)
 
 
-def _normals(path: Path, normals: FloatArray, place: Place, *, recover: bool) -> tuple[FloatArray, tuple[Finding, ...]]:
+def _normals(
+    path: Path, normals: FloatArray, not_unit: IntArray, place: Place, *, recover: bool
+) -> tuple[FloatArray, tuple[Finding, ...]]:
     findings: tuple[Finding, ...] = ()
-    if recover:
-        broken = ~np.asarray(np.isfinite(normals).all(axis=1))
-        if broken.any():
-            normals[broken] = 0.0
-            message = f"{broken.sum()} of {len(normals)} normals are not finite and count as not given"
-            findings = (Finding(Code.NORMALS_BLANKED, Level.WARN, message, _first(path, broken, place)),)
+    broken = not_unit[~np.isfinite(normals[not_unit]).all(axis=1)]
+    if recover and len(broken):
+        normals[broken] = 0.0
+        message = f"{len(broken)} of {len(normals)} normals are not finite and count as not given"
+        findings = (Finding(Code.NORMALS_BLANKED, Level.WARN, message, where(path, place(int(broken[0])))),)
     try:
-        normals, found = unit_normals(path, normals, place)
+        normals, found = unit_normals(path, normals, place, not_unit)
     except FormatError as error:
         raise FormatError(path, f"{error.what}{OR_REPAIR}", line=error.line, byte=error.byte) from None
     return normals, findings + found
-
-
-def _rows(values: npt.NDArray[Any], kept: IntArray | None) -> npt.NDArray[Any]:
-    return values if kept is None else values[kept]
 
 
 def _places_of(kept: IntArray, place: Place) -> Place:

@@ -15,12 +15,27 @@ from sicp_cam.limits import Limits
 from sicp_cam.model import BoolArray, FloatArray, IntArray, Part, Scan, Source, TriangleMesh
 from sicp_formats.surfaces.checks import Code, check_coordinates, check_registrable, origin_points, unit_normals
 from sicp_formats.surfaces.meshes import drop_collapsed, keep_points, merge_mesh
+from sicp_formats.tables.blocks import quick_columns
 from sicp_formats.tables.rows import Row
 
-__all__ = ["INTEGER", "Checked", "PolygonMesh", "Polygons", "as_part", "as_scan", "checked", "whole_numbers"]
+__all__ = [
+    "INTEGER",
+    "Checked",
+    "PolygonMesh",
+    "Polygons",
+    "as_part",
+    "as_scan",
+    "checked",
+    "equal_rows",
+    "whole_numbers",
+]
 
 INTEGER = re.compile(rb"(?<!\S)([+-]?[0-9]{1,18})(?!\S)")
 _BATCH_ROWS = 100_000
+_WORTH_LOADING_PANDAS = 20_000
+_NO_INTEGERS = re.compile(rb"[.eE+]")
+_EXACT = 2.0**53
+"""Below it, doubles tell all integers apart."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +102,8 @@ def whole_numbers(path: Path, rows: Sequence[Row], pattern: re.Pattern[bytes] = 
     FormatError
         If a word looks differently.
     """
+    if (table := equal_rows(rows)) is not None:
+        return table.ravel()
     blocks = [np.zeros(0, np.int64)]
     for start in range(0, len(rows), _BATCH_ROWS):
         batch = rows[start : start + _BATCH_ROWS]
@@ -95,6 +112,28 @@ def whole_numbers(path: Path, rows: Sequence[Row], pattern: re.Pattern[bytes] = 
         if len(words) != len(text.split()):
             raise _no_integer(path, batch, pattern)
         blocks.append(np.array(words, dtype="S19").astype(np.int64) if words else np.zeros(0, np.int64))
+    return np.concatenate(blocks)
+
+
+def equal_rows(rows: Sequence[Row]) -> IntArray | None:
+    """Parse many rows that all have as many integers.
+
+    Returns
+    -------
+    array or None
+        (n, width) integers; None if the rows are few or anything is unusual about them, which says nothing about
+        whether they can be read.
+    """
+    if len(rows) < _WORTH_LOADING_PANDAS:
+        return None
+    width, blocks = len(rows[0][1].split()), []
+    for start in range(0, len(rows), _BATCH_ROWS):
+        batch = rows[start : start + _BATCH_ROWS]
+        text = b"\n".join([row for _, row in batch])
+        found = None if _NO_INTEGERS.search(text) else quick_columns(text, width)
+        if found is None or len(found[0]) != len(batch) or any(np.abs(each).max() >= _EXACT for each in found):
+            return None
+        blocks.append(np.stack(found, axis=1).astype(np.int64))
     return np.concatenate(blocks)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from sicp_cam.model import FloatArray
 
-__all__ = ["quick_numbers"]
+__all__ = ["quick_columns", "quick_numbers"]
 
 _IN_NUMBERS = b"0123456789+-.eE\r\n"
 _BLANKS = b" \t"
@@ -50,13 +50,25 @@ def quick_numbers(text: bytes, columns: int, *, delimiter: str | None = None, de
     >>> quick_numbers(b"1 2 3\n4 5 x\n", 3) is None
     True
     """
+    found = quick_columns(text, columns, delimiter=delimiter, decimal=decimal)
+    return None if found is None else np.array(found).T
+
+
+def quick_columns(
+    text: bytes, columns: int, *, delimiter: str | None = None, decimal: str = "."
+) -> list[FloatArray] | None:
+    r"""Parse as `quick_numbers` does, and return each column by itself, as the parser leaves them: read-only, (n,).
+
+    >>> [column.tolist() for column in quick_columns(b"1 2.5\n4 5\n", 2)]
+    [[1.0, 4.0], [2.5, 5.0]]
+    """
     plain = _plain(text, delimiter, decimal)
     if plain is None or columns < 2:  # a single column has no delimiter that a short row could lack
         return None
     for separator in _separators(plain, columns, delimiter):
-        values = _parsed(plain, separator)
-        if values is not None and values.shape[1] == columns and np.isfinite(values).all():
-            return values
+        found = _parsed(plain, separator)
+        if found is not None and len(found) == columns and all(bool(np.isfinite(each).all()) for each in found):
+            return found
     return None
 
 
@@ -85,7 +97,7 @@ def _separators(text: bytes, columns: int, delimiter: str | None) -> tuple[str, 
     return (" ", r"\s+") if first.count(b" ") == columns - 1 and not first.endswith(b" ") else (r"\s+",)
 
 
-def _parsed(text: bytes, separator: str) -> FloatArray | None:
+def _parsed(text: bytes, separator: str) -> list[FloatArray] | None:
     import pandas  # only where a table is read: it takes half a second to load
 
     if separator == r"\s+":
@@ -104,8 +116,7 @@ def _parsed(text: bytes, separator: str) -> FloatArray | None:
         )
     except ValueError:  # all that this parser raises, its own errors and those of numbers alike
         return None
-    values: FloatArray = frame.to_numpy()
-    return values
+    return [frame[name].to_numpy() for name in frame]
 
 
 def _ends_with_blanks(text: bytes) -> bool:

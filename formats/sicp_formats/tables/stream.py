@@ -22,16 +22,17 @@ import numpy as np
 from sicp_cam.errors import FormatError
 from sicp_cam.limits import Limits
 from sicp_cam.model import Source
-from sicp_formats.source import describe, read_bytes
+from sicp_formats.source import check_kind, describe, read_bytes
 
 __all__ = ["Block", "TextStream", "open_text"]
 
-BLOCK_BYTES = 2**22
+BLOCK_BYTES = 2**20
 """About the size of a block: large enough for the parser, small enough for the cache."""
 
 HEAD_BYTES = 2**22
 """What `TextStream.head` shows at most, whatever the size of a block."""
 
+_KIND_BYTES = 1024
 _UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
@@ -134,8 +135,10 @@ class TextStream:
 
     def _end(self, lines: int | None) -> int:
         """Return how many bytes to take: whole lines, about a block of them, and no more lines than asked for."""
-        end = self._rest.rfind(b"\n", 0, BLOCK_BYTES) + 1 or self._rest.find(b"\n") + 1 or len(self._rest)
-        if self._ended and len(self._rest) <= BLOCK_BYTES:
+        # Less than a block beyond this one goes with it: it would only be a small one.
+        size = BLOCK_BYTES if len(self._rest) >= 2 * BLOCK_BYTES else len(self._rest)
+        end = self._rest.rfind(b"\n", 0, size) + 1 or self._rest.find(b"\n") + 1 or len(self._rest)
+        if self._ended and len(self._rest) <= size:
             end = len(self._rest)
         if lines is None or self._rest.count(b"\n", 0, end) < lines:
             return end
@@ -171,10 +174,6 @@ def open_text(path: Path, limits: Limits) -> Iterator[TextStream]:
     stream = TextStream(path, file or BytesIO(_decoded(path, content or b"")), limits, content)
     try:
         yield stream
-    except FormatError:
-        if content is None and stream.line <= 2:  # it may be no text at all
-            read_bytes(path, limits)
-        raise
     finally:
         stream.close()
 
@@ -188,11 +187,19 @@ def _long_file(path: Path, limits: Limits) -> BinaryIO | None:
         if path.suffix.lower() == ".gz":
             return None
         file = path.open("rb", buffering=0)
-        if file.read(2) in _UTF16:
-            file.close()
-            return None
-        file.seek(0)
     except (OSError, ValueError):
+        return None
+    try:
+        start = file.read(_KIND_BYTES)
+        check_kind(path, start)
+        file.seek(0)
+    except (FormatError, OSError) as error:
+        file.close()
+        if isinstance(error, FormatError):
+            raise
+        return None
+    if start.startswith(_UTF16):
+        file.close()
         return None
     return file
 
