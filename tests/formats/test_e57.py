@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from sicp_cam.errors import FormatError, InputError, UnitError
 from sicp_cam.limits import Limits
-from sicp_formats.library import e57
-from sicp_formats.library.e57 import read_scan
+from sicp_formats.external import e57
+from sicp_formats.external.e57 import read_scan
 
 pye57 = pytest.importorskip("pye57")
 

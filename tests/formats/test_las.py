@@ -11,8 +11,8 @@ import pytest
 from sicp_cam.errors import FormatError, InputError, UnitError
 from sicp_cam.findings import Level
 from sicp_cam.limits import Limits
-from sicp_formats.library import las
-from sicp_formats.library.las import read_scan
+from sicp_formats.external import las
+from sicp_formats.external.las import read_scan
 
 laspy = pytest.importorskip("laspy")
 pytest.importorskip("lazrs")

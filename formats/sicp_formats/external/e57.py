@@ -11,7 +11,7 @@ from sicp_cam.errors import FormatError, UnitError, printable
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import Scan
 from sicp_cam.units import mm_per_unit
-from sicp_formats.library.scans import answered, demand, scan_of
+from sicp_formats.external.scans import answered, demand, scan_of
 from sicp_formats.source import describe, read_bytes
 
 __all__ = ["read_scan"]
@@ -57,7 +57,7 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
     demand(path, "pye57", "e57")
     content = read_bytes(path, limits)
     _check_head(path, content)
-    result = answered(path, content, "sicp_formats.library.e57_child", "pye57", limits, {"points": limits.points})
+    result = answered(path, content, "sicp_formats.external.e57_child", "pye57", limits, {"points": limits.points})
     source = describe(path, content, format="E57", unit="m", unit_stated=True)
     return scan_of(path, result, source, mm_per_unit("m"), limits, recover)
 

@@ -1,6 +1,6 @@
-"""Read an E57 file in a process of its own: `python -m sicp_formats.library.e57_child FOLDER`.
+"""Read an E57 file in a process of its own: `python -m sicp_formats.external.e57_child FOLDER`.
 
-The library is native code that damaged files can crash; `sicp_formats.library.e57` starts this module.
+The library is native code that damaged files can crash; `sicp_formats.external.e57` starts this module.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pye57.utils import get_node
 
 from sicp_cam.child_process import answer, received
 from sicp_cam.model import FloatArray
-from sicp_formats.library.scans import packed
+from sicp_formats.external.scans import packed
 from sicp_formats.surfaces.checks import Code
 
 __all__ = ["main"]

@@ -14,7 +14,7 @@ from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import Scan
 from sicp_cam.units import mm_per_unit
-from sicp_formats.library.scans import answered, demand, scan_of
+from sicp_formats.external.scans import answered, demand, scan_of
 from sicp_formats.source import describe, read_bytes
 from sicp_formats.surfaces.checks import Code
 
@@ -60,7 +60,7 @@ def read_scan(path: Path, *, units: str | None = None, limits: Limits = DEFAULT_
     demand(path, "laspy", "las")
     content = read_bytes(path, limits)
     declared, present, kind = _check_head(path, content, limits, recover)
-    result = answered(path, content, "sicp_formats.library.las_child", "laspy", limits, {"points": present})
+    result = answered(path, content, "sicp_formats.external.las_child", "laspy", limits, {"points": present})
     if len(result.arrays["points"]) != present:
         what = (
             f"{present} points should be there, {len(result.arrays['points'])} are; the file is damaged; copy it again"

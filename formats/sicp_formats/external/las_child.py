@@ -1,6 +1,6 @@
-"""Read a LAS or LAZ file in a process of its own: `python -m sicp_formats.library.las_child FOLDER`.
+"""Read a LAS or LAZ file in a process of its own: `python -m sicp_formats.external.las_child FOLDER`.
 
-The decompressor is native code that damaged files can crash; `sicp_formats.library.las` starts this module.
+The decompressor is native code that damaged files can crash; `sicp_formats.external.las` starts this module.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import laspy
 import numpy as np
 
 from sicp_cam.child_process import answer, received
-from sicp_formats.library.scans import packed
+from sicp_formats.external.scans import packed
 
 __all__ = ["main"]
 
