@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 
 from sicp_formats.gcode.style import number_like
@@ -47,12 +47,15 @@ class Dialect:
         True if a coordinate without a point counts thousandths.
     siemens
         True if the words or the suffix are those of Siemens.
+    may_have_whole
+        False if no coordinate without a point is large enough to count thousandths.
     """
 
     decimal: str = "."
     points: bool = False
     increments: bool = False
     siemens: bool = False
+    may_have_whole: bool = field(default=True, repr=False)
 
     @classmethod
     def of(cls, suffix: str, lines: Sequence[str], *, decimal: str | None, integers: str | None) -> Dialect:
@@ -64,9 +67,11 @@ class Dialect:
         increments = integers == "thousandths"
         points = increments or _has_points(lines)
         # Only where it matters, as looking for the words of a control takes long.
-        matters = suffix.lower() in _SIEMENS_SUFFIXES or _G70.search("\n".join(lines)) or _may_have_whole(lines, points)
+        text = "\n".join(lines)
+        whole = not points or _LARGE_WHOLE.search(text) is not None
+        matters = suffix.lower() in _SIEMENS_SUFFIXES or whole or _G70.search(text)
         siemens = bool(matters) and (suffix.lower() in _SIEMENS_SUFFIXES or _has_siemens_words(lines))
-        return cls(decimal or decimal_mark(lines), points, increments, siemens)
+        return cls(decimal or decimal_mark(lines), points, increments, siemens, whole)
 
     def value(self, letter: str, number: str, *, inch: bool) -> str:
         """Return the number of a word as the decimal number that it means; an increment of inches is 0.0001.
@@ -92,11 +97,7 @@ def whole_numbers(lines: Sequence[str], dialect: Dialect) -> list[int]:
     >>> whole_numbers(["G0 X0 Y0 Z50000", "G28 Z0"], Dialect()), whole_numbers(["X1. Y2", "X100"], Dialect(points=True))
     ([1], [2])
     """
-    if (
-        dialect.siemens
-        or not _may_have_whole(lines, dialect.points)
-        or any(_HEIDENHAIN.match(line) for line in lines[:20])
-    ):
+    if dialect.siemens or not dialect.may_have_whole or any(_HEIDENHAIN.match(line) for line in lines[:20]):
         return []
     least = _LARGE if dialect.points else 1.0
     return [number for number, line in enumerate(lines, 1) if _has_whole(line, least)]
@@ -107,10 +108,6 @@ def _has_whole(line: str, least: float) -> bool:
         return False
     code = _REMARK.sub("", line)
     return not _NO_TIP.search(code) and any(float(number) >= least for number in _WHOLE.findall(code))
-
-
-def _may_have_whole(lines: Sequence[str], points: bool) -> bool:
-    return not points or bool(_LARGE_WHOLE.search("\n".join(lines)))
 
 
 def _has_siemens_words(lines: Sequence[str]) -> bool:
