@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-GROUND_FLOOR = {"model", "errors", "findings", "units", "limits", "rigid_motion", "child_process"}
+GROUND_FLOOR = {"model", "errors", "findings", "units", "limits", "ranges", "rigid_motion", "child_process"}
 METHOD = ("contour", "registration", "toolpath")
 PLOTTING = {"matplotlib", "pyvista", "vtk", "vtkmodules", "reportlab", "rich", "cyclopts"}
 HEAVY = ("OCP", "cadquery", "vtk", "vtkmodules", "pyvista", "matplotlib", "reportlab", "ezdxf")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from sicp_cam.errors import JobError, printable
+from sicp_cam.ranges import Between, unwrapped
 from sicp_postprocessors.text import counted
 
 __all__ = ["THIS_POST", "NoOptions", "build_options", "flag", "outside"]
@@ -34,17 +35,19 @@ def build_options(post: str, kind: type[T], given: Mapping[str, object]) -> T:
 
     Values may be of the field's own type, or strings as they come from a command line. Fields may be of type bool,
     int, float, str, `Literal[...]` of strings (taken in upper or lower case), a fixed-length tuple of floats, or one
-    of these `| None`. Ranges are the concern of the dataclass: its `__post_init__` raises `JobError` with one problem
-    per argument, in which `THIS_POST` becomes the name of the post.
+    of these `| None`; `Annotated[float, Between(0.1, 100.0)]` states the range. What goes beyond one field is the
+    concern of the dataclass: its `__post_init__` raises `JobError` with one problem per argument, in which `THIS_POST`
+    becomes the name of the post.
 
     Raises
     ------
     JobError
         With every problem found: unknown names, wrong types, values out of range.
 
+    >>> from typing import Annotated
     >>> @dataclasses.dataclass(frozen=True)
     ... class Speeds:
-    ...     rapid_mm_s: float = 250.0
+    ...     rapid_mm_s: Annotated[float, Between(1.0, 2500.0)] = 250.0
     ...     blend: bool = False
     >>> build_options("demo", Speeds, {"rapid_mm_s": "2000", "blend": "true"})
     Speeds(rapid_mm_s=2000.0, blend=True)
@@ -52,9 +55,12 @@ def build_options(post: str, kind: type[T], given: Mapping[str, object]) -> T:
     Traceback (most recent call last):
     sicp_cam.errors.JobError: post demo has no option 'rapid'; it has rapid_mm_s, blend; option 'blend' of post demo \
 must be true or false, not 7
+    >>> build_options("demo", Speeds, {"rapid_mm_s": 0})
+    Traceback (most recent call last):
+    sicp_cam.errors.JobError: option 'rapid_mm_s' of post demo must be from 1 to 2500, not 0
     """
     names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]  # T is a dataclass by contract
-    hints = get_type_hints(kind)
+    hints = get_type_hints(kind, include_extras=True)
     problems: list[str] = []
     values: dict[str, Any] = {}
     for name, value in given.items():
@@ -63,7 +69,7 @@ must be true or false, not 7
             problems.append(f"post {post} has no option {printable(str(name))!r}; {known}")
             continue
         try:
-            values[name] = _convert(value, hints[name])
+            values[name] = _in_range(_convert(value, unwrapped(hints[name])[0]), unwrapped(hints[name])[1])
         except ValueError as error:
             problems.append(f"option {name!r} of post {post} must be {error}, not {printable(repr(value))}")
     try:
@@ -93,6 +99,12 @@ def outside(name: str, value: float, smallest: float, largest: float) -> list[st
     if smallest <= value <= largest:
         return []
     return [f"option {name!r} must be from {smallest:g} to {largest:g}, not {value:g}"]
+
+
+def _in_range(value: Any, allowed: Between | None) -> Any:
+    if allowed is not None and value is not None and not allowed.allows(value):
+        raise ValueError(str(allowed))
+    return value
 
 
 def _convert(value: object, hint: Any) -> Any:

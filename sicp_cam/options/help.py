@@ -22,6 +22,7 @@ from typing import Any, Literal, Union
 
 from sicp_cam.errors import JobError
 from sicp_cam.options.values import Range
+from sicp_cam.ranges import unwrapped
 
 __all__ = ["Option", "annotations_of", "dataclass_options", "function_options", "parameter_texts", "summary", "written"]
 
@@ -115,7 +116,7 @@ def annotations_of(thing: Any) -> dict[str, Any]:
         If one names what its module does not have, or has for type checkers only.
     """
     try:
-        return typing.get_type_hints(thing)
+        return typing.get_type_hints(thing, include_extras=True)
     except (NameError, AttributeError, TypeError) as error:
         where = f"{thing.__module__}:{thing.__qualname__}"
         raise JobError(
@@ -184,6 +185,8 @@ def _one_line(text: str) -> str:
 
 def _type(wanted: Any, allowed: Range, count: str = "") -> str:
     """Say in words what an annotation wants; `count` is how many of them."""
+    wanted, stated = unwrapped(wanted)
+    allowed = (stated.lowest, stated.highest) if stated else allowed
     origin, parts = typing.get_origin(wanted), typing.get_args(wanted)
     many = "s" if count else ""
     if origin in (Union, types.UnionType):

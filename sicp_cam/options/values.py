@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar, Union
 
 from sicp_cam.errors import printable
+from sicp_cam.ranges import unwrapped
 
 __all__ = ["Range", "Word", "closest", "converted", "nearest", "table"]
 
@@ -45,7 +46,7 @@ def converted(value: object, wanted: Any) -> Any:
     """Return a stated value as the type that an annotation wants.
 
     Knows bool, int, float, str, Path, enumerations, Literal, tuples and unions of them; `object` and `Any` take
-    everything. A bool is no number, a number must be finite.
+    everything. A bool is no number, a number must be finite, and within its `Between` where it is annotated with one.
 
     Raises
     ------
@@ -59,6 +60,12 @@ def converted(value: object, wanted: Any) -> Any:
         ...
     ValueError: must be a number, not the text '1.5'
     """
+    wanted, allowed = unwrapped(wanted)
+    if allowed is not None:
+        number = converted(value, wanted)
+        if number is not None and not allowed.allows(number):
+            raise ValueError(f"must be {allowed}, not {number:g}")
+        return number
     origin = typing.get_origin(wanted)
     if wanted is Any or wanted is object:
         return str(value) if isinstance(value, Word) else value
