@@ -1,4 +1,4 @@
-"""Ranges as data: `Annotated[float, Between(0.1, 100.0)]` says what an option allows, to who checks and who tells it."""
+"""Ranges as data: `Annotated[float, Between(0.1, 100.0)]` says what an option allows, for checks and for help."""
 
 from __future__ import annotations
 

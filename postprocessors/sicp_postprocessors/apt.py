@@ -8,13 +8,14 @@ from typing import Literal
 
 from sicp_cam.errors import JobError
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import Event, EventKind, Program
+from sicp_cam.model import FloatArray, Program
 from sicp_cam.units import mm_per_unit
-from sicp_postprocessors.base import LinePostprocessor, Move, failures
+from sicp_postprocessors.base import failures
 from sicp_postprocessors.checks import frame_findings, frame_name, stretch_findings
-from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.numbers import fixed, trimmed
 from sicp_postprocessors.options import outside
+from sicp_postprocessors.rows import rows, words
+from sicp_postprocessors.template import LinePostprocessor, Moves
 from sicp_postprocessors.text import ascii_line, pose_words
 
 __all__ = ["Apt", "AptOptions"]
@@ -75,7 +76,7 @@ class Apt(LinePostprocessor):
         remedy = "place the part at the pose in the head of the program, or run with --frame scan"
         return [*findings, *frame_findings(program, Level.WARN, remedy)]
 
-    def begin(self, program: Program) -> Iterator[str]:
+    def start(self, program: Program) -> Iterator[str]:
         """Name the program."""
         yield f"PARTNO/{ascii_line(program.name, drop=self.comment_drop)[:_LONGEST_NAME].rstrip()}"
 
@@ -94,50 +95,57 @@ class Apt(LinePostprocessor):
         yield f"UNITS/{_WORDS[self.options.units][0]}"
         yield "MULTAX/ON"
 
-    def move(self, move: Move, previous: Move | None) -> Iterator[str]:
-        """Return one GOTO, with RAPID before it or the feed where it changes."""
-        if move.rapid:
-            yield "RAPID"
-        elif move.feed_mm_min > 0.0 and (
-            previous is None or previous.rapid or previous.feed_mm_min != move.feed_mm_min
-        ):
-            yield f"FEDRAT/{self._length(move.feed_mm_min)},{_WORDS[self.options.units][1]}"
-        tip = ",".join(self._length(value) for value in move.tip_mm)
-        axis = ",".join(fixed(value, self.options.vector_decimals) for value in move.axis)
-        if self.options.wrap:
-            yield f"GOTO/{tip},$"
-            yield f"     {axis}"
-        else:
-            yield f"GOTO/{tip},{axis}"
+    def move_joint(self, moves: Moves) -> list[str]:
+        """Return a GOTO with RAPID before it for each rapid move."""
+        return rows(f"RAPID\n{self._goto()}", *self._targets(moves))
 
-    def event(self, event: Event) -> Iterator[str]:
-        """Return the statement of one event."""
-        match event.kind:
-            case EventKind.SPINDLE if event.value == 0:
-                yield "SPINDL/OFF"
-            case EventKind.SPINDLE:
-                yield f"SPINDL/{trimmed(abs(event.value), 3)},RPM,{'CLW' if event.value > 0 else 'CCLW'}"
-            case EventKind.TOOL:
-                yield f"LOADTL/{int(event.value)}"
-                yield from self.comments(event.text)
-            case EventKind.COOLANT:
-                yield "COOLNT/ON" if event.value > 0 else "COOLNT/OFF"
-            case EventKind.DWELL:
-                yield f"DELAY/{fixed(event.value, 3)}"
-            case EventKind.STOP:
-                yield "OPSTOP" if event.text.strip().upper() == "OPSTOP" else "STOP"
-            case EventKind.COMMENT:
-                yield from (f"PPRINT/{line.removeprefix('$$ ')}" for line in self.comments(event.text))
+    def move_linear(self, moves: Moves) -> list[str]:
+        """Return a GOTO for each cut, with the feed before it where it changes."""
+        unit = _WORDS[self.options.units][1]
+        stated = zip(
+            (moves.states_feed & (moves.feeds_mm_min > 0.0)).tolist(), moves.feeds_mm_min.tolist(), strict=True
+        )
+        feeds = [f"FEDRAT/{self._length(feed)},{unit}\n" if states else "" for states, feed in stated]
+        return rows(f"{{}}{self._goto()}", words(feeds), *self._targets(moves))
 
-    def end(self, program: Program) -> Iterator[str]:
-        """Switch off what still runs, and end."""
-        running = dict.fromkeys((EventKind.SPINDLE, EventKind.COOLANT), 0.0)
-        running |= {event.kind: event.value for event in events_in_order(program.path) if event.kind in running}
-        if running[EventKind.SPINDLE]:
-            yield "SPINDL/OFF"
-        if running[EventKind.COOLANT]:
-            yield "COOLNT/OFF"
+    def spindle(self, rev_min: float) -> Iterator[str]:
+        """Return the spindle's speed, or that it is off."""
+        sense = "CLW" if rev_min > 0 else "CCLW"
+        yield f"SPINDL/{trimmed(abs(rev_min), 3)},RPM,{sense}" if rev_min else "SPINDL/OFF"
+
+    def tool(self, number: int, text: str, *, first: bool) -> Iterator[str]:
+        """Return the call of a tool that the path names."""
+        if not first:
+            yield f"LOADTL/{number}"
+            yield from self.comments(text)
+
+    def coolant(self, on: bool) -> Iterator[str]:
+        """Return the coolant's statement."""
+        yield "COOLNT/ON" if on else "COOLNT/OFF"
+
+    def pause(self, seconds: float) -> Iterator[str]:
+        """Return a dwell."""
+        yield f"DELAY/{fixed(seconds, 3)}"
+
+    def stop(self, text: str) -> Iterator[str]:
+        """Return a stop, optional where the path calls it so."""
+        yield "OPSTOP" if text.strip().upper() == "OPSTOP" else "STOP"
+
+    def remark(self, text: str) -> Iterator[str]:
+        """Return a remark of the path as text that the next processor prints."""
+        yield from (f"PPRINT/{line.removeprefix('$$ ')}" for line in self.comments(text))
+
+    def finish(self, program: Program) -> Iterator[str]:
+        """End the program."""
         yield "FINI"
+
+    def _goto(self) -> str:
+        place, vector = (f"{{:.{n}}}" for n in (self.options.position_decimals, self.options.vector_decimals))
+        end = ",$\n     " if self.options.wrap else ","
+        return f"GOTO/{place},{place},{place}{end}{vector},{vector},{vector}"
+
+    def _targets(self, moves: Moves) -> tuple[FloatArray, ...]:
+        return (*(moves.tips_mm / mm_per_unit(self.options.units)).T, *moves.axes.T)
 
     def _length(self, value_mm: float) -> str:
         return fixed(value_mm / mm_per_unit(self.options.units), self.options.position_decimals)

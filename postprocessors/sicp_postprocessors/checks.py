@@ -2,8 +2,8 @@
 
 Codes: 601 empty path, 602 feed not valid, 603 feed missing, 604 axis not of unit length, 605 coordinate too large,
 606 event not valid, 607 program frame not rigid, 608 column not valid, 609 name changed, 610 event not written,
-611 begins with a cutting move, 612 program frame is not the scan frame. Posts of this package go on at 620 (G-code)
-and 630 (VAL3).
+611 begins with a cutting move, 612 program frame is not the scan frame, 653 cut longer than a program. Posts of this
+package go on at 620 (G-code) and 630 (robots).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -101,10 +102,10 @@ def event_place(event: Event) -> str:
     return f"before move {event.before_move}" + (f", line {event.line}" if event.line > 0 else "")
 
 
-def event_findings(path: ToolPath, kinds: set[EventKind], why: str) -> list[Finding]:
+def event_findings(events: Iterable[Event], kinds: set[EventKind], why: str) -> list[Finding]:
     """Return a warning for each different text of events of the given kinds, because the program does not hold them."""
     lost: dict[tuple[EventKind, str], list[Event]] = {}
-    for event in path.events:
+    for event in events:
         if event.kind in kinds:
             lost.setdefault((event.kind, event.text), []).append(event)
     return [
@@ -112,9 +113,9 @@ def event_findings(path: ToolPath, kinds: set[EventKind], why: str) -> list[Find
             610,
             Level.WARN,
             f"{kind} {printable(text)!r} is not written: {why}" if text else f"{kind} is not written: {why}",
-            event_place(events[0]) + (f", and {len(events) - 1} more" if len(events) > 1 else ""),
+            event_place(left_out[0]) + (f", and {len(left_out) - 1} more" if len(left_out) > 1 else ""),
         )
-        for (kind, text), events in lost.items()
+        for (kind, text), left_out in lost.items()
     ]
 
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from sicp_cam.errors import PathError
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import Event, EventKind, FloatArray, Program
+from sicp_cam.model import FloatArray, Program
 from sicp_cam.units import mm_per_unit
-from sicp_postprocessors.base import LinePostprocessor, Move, failures
+from sicp_postprocessors.base import failures
 from sicp_postprocessors.checks import frame_findings, frame_name, move_place, stretch_findings
 from sicp_postprocessors.gcode_options import GCodeOptions
-from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.numbers import fixed, rounded, trimmed
 from sicp_postprocessors.options import flag
 from sicp_postprocessors.rotary import HeadAngles, axes_from_angles, axis_errors_deg, head_angles
+from sicp_postprocessors.rows import rows, words
+from sicp_postprocessors.template import LinePostprocessor, Moves
 from sicp_postprocessors.text import pose_words
 
 __all__ = ["GCode", "GCodeOptions"]
@@ -55,7 +56,7 @@ class GCode(LinePostprocessor):
             findings += self._rotary_findings(program)
         return findings
 
-    def begin(self, program: Program) -> Iterator[str]:
+    def start(self, program: Program) -> Iterator[str]:
         """Return the percent sign and the O word, where the dialect has them."""
         if self.options.dialect.percent:
             yield "%"
@@ -84,75 +85,83 @@ class GCode(LinePostprocessor):
         yield f"{unit} G90 G94 G17 G40"
         if options.work_offset:
             yield options.work_offset
-        if not any(e.kind is EventKind.TOOL and e.before_move == 0 for e in program.path.events):
-            yield self._tcp_on(options.tool)
 
-    def move(self, move: Move, previous: Move | None) -> Iterator[str]:
-        """Return one block; the feed stands where it changes, and after every rapid move."""
-        factor = mm_per_unit(self.options.units)
-        decimals = self.options.position_decimals
-        words = ["G0" if move.rapid else "G1"]
-        words += [f"{axis}{fixed(v / factor, decimals)}" for axis, v in zip("XYZ", move.tip_mm, strict=True)]
-        words.append(move.orientation)
-        if not move.rapid and (previous is None or previous.rapid or previous.feed_mm_min != move.feed_mm_min):
-            words.append(f"F{trimmed(move.feed_mm_min / factor, _FEED_DECIMALS[self.options.units])}")
-        yield " ".join(words)
+    def tool(self, number: int, text: str, *, first: bool) -> Iterator[str]:
+        """Return a tool change, or tip control alone for the tool that is in the spindle."""
+        if first:
+            yield self._tcp_on(self.options.tool)
+            return
+        # Tip control belongs to one tool: its length must not outlive the change.
+        yield self.options.tcp_off or self.options.dialect.tcp_off
+        yield f"T{number} M6"
+        yield from self.comments(text)
+        yield self._tcp_on(number)
 
-    def event(self, event: Event) -> Iterator[str]:
-        """Return the blocks of one event."""
-        match event.kind:
-            case EventKind.SPINDLE if event.value == 0:
-                yield "M5"
-            case EventKind.SPINDLE:
-                yield f"S{trimmed(abs(event.value), 3)} {'M3' if event.value > 0 else 'M4'}"
-            case EventKind.TOOL:
-                # Tip control belongs to one tool: its length must not outlive the change.
-                yield self.options.tcp_off or self.options.dialect.tcp_off
-                yield f"T{int(event.value)} M6"
-                if event.text:
-                    yield from self.comments(event.text)
-                yield self._tcp_on(int(event.value))
-            case EventKind.COOLANT:
-                yield "M8" if event.value > 0 else "M9"
-            case EventKind.DWELL:
-                yield self._dwell(event.value)
-            case EventKind.STOP:
-                yield "M0"
-            case EventKind.COMMENT:
-                yield from self.comments(event.text)
+    def move_joint(self, moves: Moves) -> list[str]:
+        """Return rapid blocks."""
+        return self._blocks("G0", moves)
 
-    def end(self, program: Program) -> Iterator[str]:
-        """Return the end: whatever still runs is switched off, tip control too."""
-        running = dict.fromkeys((EventKind.SPINDLE, EventKind.COOLANT), 0.0)
-        running |= {event.kind: event.value for event in events_in_order(program.path) if event.kind in running}
-        if running[EventKind.SPINDLE]:
-            yield "M5"
-        if running[EventKind.COOLANT]:
-            yield "M9"
+    def move_linear(self, moves: Moves) -> list[str]:
+        """Return cutting blocks; the feed stands where it changes, and after every rapid move."""
+        return self._blocks("G1", moves)
+
+    def spindle(self, rev_min: float) -> Iterator[str]:
+        """Return the words of a spindle speed."""
+        yield f"S{trimmed(abs(rev_min), 3)} {'M3' if rev_min > 0 else 'M4'}" if rev_min else "M5"
+
+    def coolant(self, on: bool) -> Iterator[str]:
+        """Return the word of the coolant."""
+        yield "M8" if on else "M9"
+
+    def pause(self, seconds: float) -> Iterator[str]:
+        """Return a dwell."""
+        if self._dwell_word() == "P_MS":
+            yield f"G4 P{fixed(round(seconds * 1000.0), 0)}"
+        else:
+            yield f"G4 {self._dwell_word()}{fixed(seconds, 3)}"
+
+    def stop(self, text: str) -> Iterator[str]:
+        """Return a program stop."""
+        yield "M0"
+
+    def finish(self, program: Program) -> Iterator[str]:
+        """Return the end: tip control is switched off."""
         yield self.options.tcp_off or self.options.dialect.tcp_off
         yield "M30"
         if self.options.dialect.percent:
             yield "%"
 
-    def orientations(self, program: Program) -> Sequence[str]:
-        """Return the orientation words of every move.
+    def orientations(self, program: Program) -> FloatArray:
+        """Return the axes (n, 3) of every move, or its two rotary angles (n, 2) in degrees.
 
         Raises
         ------
         PathError
             If forward kinematics of the written rotary words do not give the axis back.
         """
-        axes, options = program.path.axes, self.options
-        if options.orientation == "rotary":
-            angles = self._rotary_angles(axes)
-            self._verify(program, angles)
-            first, decimals = options.kinematics[0], options.angle_decimals
-            pairs = zip(angles.tilt_deg.tolist(), angles.turn_deg.tolist(), strict=True)
-            return [f"{first}{fixed(tilt, decimals)} C{fixed(turn, decimals)}" for tilt, turn in pairs]
-        i, j, k = ("A3=", "B3=", "C3=") if options.orientation == "siemens" else ("I", "J", "K")
-        rows = rounded(axes, options.vector_decimals).tolist()
-        number = f".{options.vector_decimals}f"
-        return [f"{i}{x:{number}} {j}{y:{number}} {k}{z:{number}}" for x, y, z in rows]
+        axes = program.path.axes
+        if self.options.orientation != "rotary":
+            return axes
+        angles = self._rotary_angles(axes)
+        self._verify(program, angles)
+        return np.column_stack([angles.tilt_deg, angles.turn_deg])
+
+    def _blocks(self, code: str, moves: Moves) -> list[str]:
+        options, factor = self.options, mm_per_unit(self.options.units)
+        place, vector, angle = options.position_decimals, options.vector_decimals, options.angle_decimals
+        tips = f"X{{:.{place}}} Y{{:.{place}}} Z{{:.{place}}}"
+        turn = {
+            "vector": f"I{{:.{vector}}} J{{:.{vector}}} K{{:.{vector}}}",
+            "siemens": f"A3={{:.{vector}}} B3={{:.{vector}}} C3={{:.{vector}}}",
+            "rotary": f"{options.kinematics[0]}{{:.{angle}}} C{{:.{angle}}}",
+        }[options.orientation]
+        feeds = self._feed_words(moves)
+        return rows(f"{code} {tips} {turn}{{}}", *(moves.tips_mm / factor).T, *moves.orientations.T, words(feeds))
+
+    def _feed_words(self, moves: Moves) -> list[str]:
+        decimals, factor = _FEED_DECIMALS[self.options.units], mm_per_unit(self.options.units)
+        stated = zip(moves.states_feed.tolist(), (moves.feeds_mm_min / factor).tolist(), strict=True)
+        return [f" F{trimmed(feed, decimals)}" if states else "" for states, feed in stated]
 
     def assemble(self, lines: Iterable[str]) -> Iterator[str]:
         """Return the lines with numbered blocks; comments, the O word and percent signs have no number."""
@@ -223,8 +232,3 @@ class GCode(LinePostprocessor):
 
     def _dwell_word(self) -> str:
         return self.options.dwell or self.options.dialect.dwell
-
-    def _dwell(self, seconds: float) -> str:
-        if self._dwell_word() == "P_MS":
-            return f"G4 P{fixed(round(seconds * 1000.0), 0)}"
-        return f"G4 {self._dwell_word()}{fixed(seconds, 3)}"

@@ -1,44 +1,60 @@
-"""A path as a post walks along it: the moves one by one, and the events in their order."""
+"""A path as a post sees it: moves of one kind as columns, events in their order, and where it may be divided."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from sicp_cam.model import Event, Program, Status, ToolPath
+import numpy as np
 
-__all__ = ["Move", "events_by_move", "events_in_order", "moves_of"]
+from sicp_cam.model import BoolArray, Event, EventKind, FloatArray, IntArray, ToolPath
 
-
-@dataclass(frozen=True, slots=True)
-class Move:
-    """One move, as the hooks of `LinePostprocessor` see it."""
-
-    index: int
-    tip_mm: tuple[float, float, float]
-    axis: tuple[float, float, float]
-    feed_mm_min: float
-    rapid: bool
-    status: Status
-    orientation: str
-    """What `orientations` returned for this move."""
+__all__ = ["Moves", "divided_at_retracts", "events_by_move", "events_in_order", "longest_part", "tools_in_use"]
 
 
-def moves_of(program: Program, orientations: Sequence[str]) -> Iterator[Move]:
-    """Return the moves of a program, each with its orientation words."""
-    path = program.path
-    columns = zip(
-        path.tips_mm.tolist(),
-        path.axes.tolist(),
-        path.feeds_mm_min.tolist(),
-        path.rapid.tolist(),
-        program.status,
-        orientations,
-        strict=True,
-    )
-    for index, (tip, axis, feed, rapid, status, orientation) in enumerate(columns):
-        yield Move(index, tuple(tip), tuple(axis), feed, rapid, status, orientation)
+@dataclass(frozen=True, slots=True, eq=False)
+class Moves:
+    """Moves of one kind, in their order, as the verbs of `LinePostprocessor` see them: arrays of n rows.
+
+    Parameters
+    ----------
+    index
+        (n,) index of each move in the program.
+    tips_mm, axes
+        (n, 3) target of the tip, and unit vector from tip to holder, in the program frame.
+    feeds_mm_min
+        (n,) speed of the tip; for rapid moves that of `rapid_feed_mm_min`, 0 where the controller has its own.
+    zones_mm
+        (n,) distance from the target at which the move may bend into the next; 0 to come to rest there.
+    rapid
+        (n,) True where the tool does not cut.
+    tools
+        (n,) number of the tool in use, -1 where the path has not named any.
+    orientations
+        (n, ...) what `orientations` returned for these moves.
+    states_feed, states_zone
+        (n,) True where feed or zone differ from what holds before: the first move of its kind in a program file, and
+        wherever they change.
+    """
+
+    index: IntArray
+    tips_mm: FloatArray
+    axes: FloatArray
+    feeds_mm_min: FloatArray
+    zones_mm: FloatArray
+    rapid: BoolArray
+    tools: IntArray
+    orientations: FloatArray
+    states_feed: BoolArray
+    states_zone: BoolArray
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def those(self, which: BoolArray | IntArray) -> Moves:
+        """Return some of the moves, by a mask (n,) or by rows."""
+        return Moves(*(getattr(self, name)[which] for name in self.__slots__))
 
 
 def events_in_order(path: ToolPath) -> list[Event]:
@@ -46,9 +62,56 @@ def events_in_order(path: ToolPath) -> list[Event]:
     return sorted(path.events, key=lambda event: event.before_move)
 
 
-def events_by_move(path: ToolPath) -> dict[int, list[Event]]:
+def events_by_move(events: Iterable[Event]) -> dict[int, list[Event]]:
     """Return the events before each move; those after the last one stand at the number of moves."""
-    events: dict[int, list[Event]] = defaultdict(list)
-    for event in path.events:
-        events[event.before_move].append(event)
-    return events
+    grouped: dict[int, list[Event]] = defaultdict(list)
+    for event in events:
+        grouped[event.before_move].append(event)
+    return grouped
+
+
+def tools_in_use(path: ToolPath) -> IntArray:
+    """Return the number of the tool of each move (n,), -1 where the path has not named one yet."""
+    tools = np.full(len(path), -1, np.int64)
+    for event in events_in_order(path):
+        if event.kind is EventKind.TOOL:
+            tools[event.before_move :] = int(event.value)
+    return tools
+
+
+def divided_at_retracts(rapid: BoolArray, longest: int, *, within_cuts: bool) -> list[range]:
+    """Divide the moves of a path into parts of at most `longest`, each of which but the first begins with a rapid move.
+
+    Parameters
+    ----------
+    rapid
+        (n,) True for rapid moves.
+    longest
+        Most moves of a part.
+    within_cuts
+        What becomes of a cut that is longer than that: True divides it, False keeps it whole in a part of its own.
+
+    >>> rapid = np.array([1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0], bool)
+    >>> divided_at_retracts(rapid, 4, within_cuts=False)
+    [range(0, 3), range(3, 9), range(9, 11)]
+    >>> divided_at_retracts(rapid, 4, within_cuts=True)
+    [range(0, 3), range(3, 7), range(7, 11)]
+    """
+    retracts = np.flatnonzero(rapid)
+    parts, start = [], 0
+    while len(rapid) - start > longest:
+        after = int(np.searchsorted(retracts, start + longest, side="right"))
+        if after > 0 and retracts[after - 1] > start:
+            stop = int(retracts[after - 1])
+        elif within_cuts:
+            stop = start + longest
+        else:
+            stop = int(retracts[after]) if after < len(retracts) else len(rapid)
+        parts.append(range(start, stop))
+        start = stop
+    return [*parts, range(start, len(rapid))] if start < len(rapid) else parts
+
+
+def longest_part(parts: Iterable[range]) -> range:
+    """Return the part with most moves."""
+    return max(parts, key=len)

@@ -44,10 +44,9 @@ def build_options(post: str, kind: type[T], given: Mapping[str, object]) -> T:
     JobError
         With every problem found: unknown names, wrong types, values out of range.
 
-    >>> from typing import Annotated
     >>> @dataclasses.dataclass(frozen=True)
     ... class Speeds:
-    ...     rapid_mm_s: Annotated[float, Between(1.0, 2500.0)] = 250.0
+    ...     rapid_mm_s: float = 250.0
     ...     blend: bool = False
     >>> build_options("demo", Speeds, {"rapid_mm_s": "2000", "blend": "true"})
     Speeds(rapid_mm_s=2000.0, blend=True)
@@ -55,9 +54,6 @@ def build_options(post: str, kind: type[T], given: Mapping[str, object]) -> T:
     Traceback (most recent call last):
     sicp_cam.errors.JobError: post demo has no option 'rapid'; it has rapid_mm_s, blend; option 'blend' of post demo \
 must be true or false, not 7
-    >>> build_options("demo", Speeds, {"rapid_mm_s": 0})
-    Traceback (most recent call last):
-    sicp_cam.errors.JobError: option 'rapid_mm_s' of post demo must be from 1 to 2500, not 0
     """
     names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]  # T is a dataclass by contract
     hints = get_type_hints(kind, include_extras=True)

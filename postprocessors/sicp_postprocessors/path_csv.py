@@ -10,14 +10,13 @@ from sicp_cam.findings import Finding, Level
 from sicp_cam.model import FloatArray, Program
 from sicp_postprocessors.base import Postprocessor
 from sicp_postprocessors.checks import frame_findings, name_findings
-from sicp_postprocessors.numbers import rounded
+from sicp_postprocessors.rows import rows, words
 from sicp_postprocessors.text import ascii_line, counted, file_stem
 
 __all__ = ["COLUMNS", "PathCsv"]
 
 COLUMNS = ("x", "y", "z", "i", "j", "k", "feed", "rapid", "status")
 _POSITION_DECIMALS, _AXIS_DECIMALS, _FEED_DECIMALS, _COLUMN_DECIMALS = 4, 7, 4, 6
-_CHUNK_ROWS = 4096
 _NOT_IN_A_CELL = ",;\"'"
 _LONGEST_OVERRIDE = 100
 
@@ -56,43 +55,25 @@ class PathCsv(Postprocessor):
     def files(self, program: Program) -> dict[str, bytes]:
         """Return the one table."""
         path = program.path
-        numbers = np.column_stack(
-            [
-                rounded(path.tips_mm, _POSITION_DECIMALS),
-                rounded(path.axes, _AXIS_DECIMALS),
-                rounded(path.feeds_mm_min, _FEED_DECIMALS),
-            ]
-        )
-        extras = [_column_cells(column) for column in program.columns.values()]
-        row = ",".join(
-            [f"%.{_POSITION_DECIMALS}f"] * 3
-            + [f"%.{_AXIS_DECIMALS}f"] * 3
-            + [f"%.{_FEED_DECIMALS}f", "%d", "%s"]
-            + ["%s"] * len(extras)
-            + ["1"] * bool(program.overridden)
-        )
-        cells = zip(*numbers.T.tolist(), path.rapid.tolist(), program.status, *extras, strict=True)
-        flat = [cell for line in cells for cell in line]
+        place, axis, more = (f"{{:.{n}}}" for n in (_POSITION_DECIMALS, _AXIS_DECIMALS, _COLUMN_DECIMALS))
+        feed = f"{{:.{_FEED_DECIMALS}}}"
+        row = ",".join([place] * 3 + [axis] * 3 + [feed, "{:d}", "{}"] + ["{}"] * len(program.columns))
+        extras = [words(_column_cells(column, more)) for column in program.columns.values()]
+        status = words([status.value for status in program.status])
+        numbers = (*path.tips_mm.T, *path.axes.T, path.feeds_mm_min, path.rapid, status, *extras)
+        lines = rows(row + ",1" * bool(program.overridden), *numbers)
         head = ",".join((*COLUMNS, *program.columns, *_overridden_column(program)))
-        table = head + "\n" + _formatted(row + "\n", flat, len(COLUMNS) + len(extras))
-        return {f"{file_stem(program.name)}.csv": table.encode("ascii")}
+        return {f"{file_stem(program.name)}.csv": "\n".join([head, *lines, ""]).encode("ascii")}
 
 
-def _column_cells(column: FloatArray) -> list[str]:
+def _column_cells(column: FloatArray, field: str) -> list[str]:
     """Return the cells of a further column, empty where it is masked."""
-    values = rounded(np.asarray(column, np.float64), _COLUMN_DECIMALS).tolist()
     masked = np.ma.getmaskarray(column).tolist()
-    return ["" if none else f"{value:.{_COLUMN_DECIMALS}f}" for value, none in zip(values, masked, strict=True)]
+    cells = zip(rows(field, np.asarray(column, np.float64)), masked, strict=True)
+    return ["" if none else cell for cell, none in cells]
 
 
 def _overridden_column(program: Program) -> list[str]:
     """Return the name of the column that says which gates were overridden, if any, without what ends a cell."""
     lines = [ascii_line(line, drop=_NOT_IN_A_CELL)[:_LONGEST_OVERRIDE] for line in program.overridden]
     return [f"overridden: {' and '.join(lines)}"] if lines else []
-
-
-def _formatted(row: str, cells: list[object], width: int) -> str:
-    """Format rows in chunks: one formatting of thousands of cells is faster than thousands of formattings."""
-    step = _CHUNK_ROWS * width
-    chunks = (cells[start : start + step] for start in range(0, len(cells), step))
-    return "".join((row * (len(chunk) // width)) % tuple(chunk) for chunk in chunks)

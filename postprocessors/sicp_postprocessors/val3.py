@@ -72,7 +72,7 @@ class Val3(Postprocessor):
         findings += [
             *name_findings(program, application_name(program.name)),
             *first_move_findings(path),
-            *event_findings(path, {EventKind.OTHER}, "it is a word of another controller"),
+            *event_findings(path.events, {EventKind.OTHER}, "it is a word of another controller"),
             *cell_findings(path, options, self.name),
             *spindle_findings(path, options, self.name),
             *tool_findings(path, self.name),

@@ -6,7 +6,7 @@ import inspect
 import itertools
 import pkgutil
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pytest
@@ -16,12 +16,15 @@ import sicp_postprocessors
 from sicp_cam.errors import JobError, OutputError, PathError
 from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind
-from sicp_postprocessors.base import LinePostprocessor, Postprocessor
+from sicp_cam.ranges import Between
+from sicp_postprocessors.base import Postprocessor
 from sicp_postprocessors.checks import common_findings, event_findings, move_place, stretch_findings
 from sicp_postprocessors.gcode import GCode
-from sicp_postprocessors.numbers import fixed, rounded
+from sicp_postprocessors.numbers import fixed, rounded, trimmed
 from sicp_postprocessors.options import THIS_POST, build_options, flag, outside
 from sicp_postprocessors.path_csv import PathCsv
+from sicp_postprocessors.rows import rows, words
+from sicp_postprocessors.template import LinePostprocessor
 from sicp_postprocessors.text import ascii_line, ascii_lines, ascii_name, counted, file_stem
 from sicp_postprocessors.val3 import Val3
 
@@ -33,7 +36,7 @@ def test_examples_in_docstrings_run(module):
 
 
 def test_the_example_of_a_third_party_is_run():
-    assert doctest.testmod(importlib.import_module("sicp_postprocessors.base")).attempted >= 10
+    assert doctest.testmod(importlib.import_module("sicp_postprocessors.template")).attempted >= 10
 
 
 class TestNumbers:
@@ -57,10 +60,26 @@ class TestNumbers:
         with pytest.raises(PathError, match="cannot be written"):
             fixed(value, 3)
         with pytest.raises(PathError, match="cannot be written"):
+            rows("{:.3}", [0.0, value])
+        with pytest.raises(PathError, match="cannot be written"):
             rounded(np.array([0.0, value]), 3)
 
     def test_rounded_has_no_minus_zero(self):
         assert not np.signbit(rounded(np.array([-1e-9, -0.0]), 4)).any()
+
+    @pytest.mark.parametrize("decimals", range(13))
+    def test_rows_hold_the_digits_of_fixed(self, decimals):
+        rng = np.random.default_rng(decimals)
+        sizes = 10.0 ** rng.integers(-9, 7, 9000)
+        values = np.concatenate([rng.normal(size=9000) * sizes / 4.0, [0, -0.0, -1e-9, 1e7, -1e7, 9.9999999, 0.5, 2.5]])
+        plain = [fixed(value, decimals) for value in rounded(values, decimals).tolist()]
+        assert rows(f"{{:.{decimals}}}", values) == plain
+        assert rows(f"a{{:.{decimals}t}}", values) == [f"a{trimmed(float(text), decimals)}" for text in plain]
+        signed = rows(f"{{:+.{decimals}}}", values)
+        assert [text.lstrip("+") for text in signed] == plain and all(text[0] in "+-" for text in signed)
+
+    def test_rows_of_nothing(self):
+        assert rows("{:.3}{}", np.zeros(0), words([])) == []
 
 
 class TestText:
@@ -100,7 +119,7 @@ class TestText:
 class Everything:
     flag: bool = False
     count: int = 1
-    size_mm: float = 1.0
+    size_mm: Annotated[float, Between(0.5, 2500.0)] = 1.0
     word: str = ""
     kind: Literal["a", "b"] = "a"
     pair: tuple[float, float] | None = None
@@ -125,7 +144,8 @@ class TestOptions:
         ("name", "value"),
         [("flag", "maybe"), ("flag", 2), ("count", "1.5"), ("count", True), ("count", 1.0), ("count", "1_0"),
          ("count", "٣"), ("size_mm", "nan"), ("size_mm", float("inf")), ("size_mm", "1e999"), ("size_mm", "1,5"),
-         ("size_mm", True), ("size_mm", None), ("word", 3), ("word", "a\nb"), ("word", "é"),
+         ("size_mm", True), ("size_mm", None), ("size_mm", 0.4), ("size_mm", "2501"),
+         ("word", 3), ("word", "a\nb"), ("word", "é"),
          ("kind", "c"), ("kind", ["a"]), ("pair", "1,2,3"), ("pair", 4), ("pair", ["x", 1]), ("count", 9)],
     )  # fmt: skip
     def test_wrong_values_are_refused_by_name(self, name, value):
@@ -206,14 +226,12 @@ class TestChecks:
 
     def test_events_left_out_are_told_once_for_each_text(self):
         events = [Event(i, EventKind.OTHER, 0.0, text, i + 5) for i, text in enumerate(["G49", "a\nb", "G49"])]
-        findings = event_findings(straight_program(3, events=tuple(events)).path, {EventKind.OTHER}, "why")
+        findings = event_findings(events, {EventKind.OTHER}, "why")
         assert [f.where for f in findings] == ["before move 0, line 5, and 1 more", "before move 1, line 6"]
         assert all(f.code == 610 and f.level is Level.WARN and "\n" not in f.message for f in findings)
 
     def test_an_event_without_text_is_told_by_its_kind(self):
-        (finding,) = event_findings(
-            straight_program(2, events=(Event(0, EventKind.COOLANT, 1.0),)).path, {EventKind.COOLANT}, "why"
-        )
+        (finding,) = event_findings([Event(0, EventKind.COOLANT, 1.0)], {EventKind.COOLANT}, "why")
         assert finding.message == "coolant is not written: why"
 
     def test_places(self):
@@ -234,8 +252,10 @@ class Plain(LinePostprocessor):
 
     comment_drop = "!"
 
-    def begin(self, program):
-        yield "begin"
+    modal_speed = True
+
+    def start(self, program):
+        yield "start"
 
     def comment(self, text):
         return f"# {text}"
@@ -243,22 +263,103 @@ class Plain(LinePostprocessor):
     def setup(self, program):
         yield "setup"
 
-    def move(self, move, previous):
-        yield f"{move.index} after {previous.index if previous else None}"
+    def speed(self, feed_mm_min):
+        yield f"speed {feed_mm_min:g}"
 
-    def event(self, event):
+    def move_joint(self, moves):
+        return [f"joint {index}" for index in moves.index]
+
+    def move_linear(self, moves):
+        return [f"linear {index}" for index in moves.index]
+
+    def stop(self, text):
         yield self.line_text
 
-    def end(self, program):
+    def spindle(self, rev_min):
+        yield f"spindle {rev_min:g}"
+
+    def finish(self, program):
         yield "end"
+
+
+def body(post, program):
+    """Return the lines between setup and end."""
+    (content,) = post.write(program).values()
+    lines = content.decode().split("\n")
+    return lines[lines.index("setup") + 1 : lines.index("end")]
 
 
 class TestTemplate:
     def test_moves_and_events_come_in_order(self):
         events = (Event(2, EventKind.STOP), Event(0, EventKind.STOP), Event(1, EventKind.OTHER))
         (content,) = Plain().write(straight_program(2, events=events)).values()
-        head = ["begin", "# porthole", "# not a safety function: verify at reduced speed", "setup"]
-        assert content.decode().split("\n") == [*head, "line", "0 after None", "1 after 0", "line", "end", ""]
+        head = ["start", "# porthole", "# not a safety function: verify at reduced speed", "setup"]
+        assert content.decode().split("\n") == [*head, "line", "joint 0", "speed 600", "linear 1", "line", "end", ""]
+
+    def test_a_feed_is_stated_where_it_changes_and_behind_every_rapid_move_that_hides_it(self):
+        program = straight_program(7, feed=[0, 600, 600, 900, 0, 900, 900], rapid=[1, 0, 0, 0, 1, 0, 0])
+        joint = body(Plain(), program)
+        assert [line for line in joint if line.startswith("speed")] == ["speed 600", "speed 900", "speed 900"]
+        assert joint[:3] == ["joint 0", "speed 600", "linear 1"] and joint[-3:] == ["speed 900", "linear 5", "linear 6"]
+
+    def test_the_rapid_moves_of_a_robot_are_straight_and_have_a_speed_of_their_own(self):
+        class Robot(Plain):
+            straight_rapids = True
+
+            def rapid_feed_mm_min(self):
+                return 15000.0
+
+        lines = body(Robot(), straight_program(4, feed=[0, 600, 0, 600], rapid=[1, 0, 1, 0]))
+        speeds = ["speed 600", "linear 1", "speed 15000", "linear 2", "speed 600", "linear 3"]
+        assert lines == ["joint 0", *speeds]
+
+    def test_what_still_runs_at_the_end_is_switched_off(self):
+        lines = body(Plain(), straight_program(2, events=(Event(1, EventKind.SPINDLE, -300.0),)))
+        assert lines == ["joint 0", "spindle -300", "speed 600", "linear 1", "spindle 0"]
+        lines = body(Plain(), straight_program(2, events=(Event(1, EventKind.SPINDLE, 0.0),)))
+        assert lines == ["joint 0", "spindle 0", "speed 600", "linear 1"]
+
+    def test_a_post_that_loses_moves_is_stopped(self):
+        class Losing(Plain):
+            def move_linear(self, moves):
+                return ["one"]
+
+        with pytest.raises(OutputError, match="post plain wrote 1 texts for 2 moves; mend move_linear"):
+            Losing().write(straight_program(3))
+
+    def test_a_cut_longer_than_a_program_stays_whole_and_is_told(self):
+        @dataclass(frozen=True)
+        class Split:
+            max_moves_per_program: int = 3
+            split_cuts: bool = False
+
+        class Splitting(Plain):
+            Options = Split
+
+        program = straight_program(9, rapid=[1, 0, 0, 0, 0, 1, 0, 0, 1])
+        post = Splitting()
+        assert [len(part) for part in post.parts(program.path)] == [5, 3, 1]
+        (told,) = [f for f in post.preflight(program) if f.code == 653]
+        assert told.where == "moves 0 to 4, lines 10 to 14" and "--set post.plain.split_cuts=true" in told.message
+        forced = Splitting({"split_cuts": True})
+        assert [len(part) for part in forced.parts(program.path)] == [3, 2, 3, 1]
+        assert not [f for f in forced.preflight(program) if f.code == 653]
+        # Each part states what holds in it.
+        assert [body[0] for body in forced.bodies(program)] == ["joint 0", "speed 600", "joint 5", "joint 8"]
+
+    def test_an_event_of_another_language_may_switch_an_output(self):
+        class Switching(Plain):
+            def switched(self, event):
+                return ("vacuum", True) if event.text == "AUXFUN/50" else None
+
+            def output(self, signal, on):
+                yield f"{signal} {on}"
+
+        events = (Event(1, EventKind.OTHER, 0.0, "AUXFUN/50"), Event(1, EventKind.OTHER, 0.0, "AUXFUN/51"))
+        program = straight_program(2, events=events)
+        assert body(Switching(), program) == ["joint 0", "vacuum True", "speed 600", "linear 1"]
+        (told,) = [f for f in Switching().preflight(program) if f.code == 610]
+        assert "AUXFUN/51" in told.message
 
     def test_the_head_holds_notes_and_remarks_as_plain_comments(self):
         class Remarking(Plain):
@@ -267,7 +368,7 @@ class TestTemplate:
 
         program = straight_program(2, notes=("made! by", NASTY), name="a\nb")
         (content,) = Remarking().write(program).values()
-        head = content.decode("ascii").split("\n")[1:-4]
+        head = content.decode("ascii").split("\n")[1:-5]
         assert head[:2] == ["# a b", "# made by"] and "Robots" in head[2]
         assert head[3:] == ["# not a safety function: verify at reduced speed", "# tool tip control", "setup"]
 
@@ -283,7 +384,7 @@ class TestTemplate:
     def test_a_post_without_comment_syntax_cannot_be_made(self):
         class Unfinished(LinePostprocessor):
             name, summary, suffix = "unfinished", "for the tests", ".txt"
-            begin = move = event = end = Plain.begin
+            move_joint = move_linear = Plain.move_joint
 
         with pytest.raises(TypeError, match="comment"):
             Unfinished()
@@ -321,10 +422,11 @@ class TestTemplate:
 @pytest.mark.parametrize("post", [Val3, GCode, PathCsv])
 def test_every_option_has_a_docstring_under_its_field(post):
     """`sicp-cam plugins NAME` reads them from the source: a text of its own for each, that ends as a sentence."""
-    body = ast.parse(inspect.getsource(post.Options)).body[0].body
+    own = [kind for kind in reversed(post.Options.__mro__) if dataclasses.is_dataclass(kind)]
     told = {
         field.target.id: text.value.value
-        for field, text in itertools.pairwise(body)
+        for kind in own
+        for field, text in itertools.pairwise(ast.parse(inspect.getsource(kind)).body[0].body)
         if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
     }
     assert list(told) == [field.name for field in dataclasses.fields(post.Options)]

@@ -10,9 +10,10 @@ from post_reread import load_val3, read_csv
 
 from sicp_cam.model import EventKind
 from sicp_postprocessors.apt import Apt
-from sicp_postprocessors.base import SAFETY_NOTE, LinePostprocessor
+from sicp_postprocessors.base import SAFETY_NOTE
 from sicp_postprocessors.gcode import GCode
 from sicp_postprocessors.path_csv import COLUMNS, PathCsv
+from sicp_postprocessors.template import LinePostprocessor
 from sicp_postprocessors.text import ascii_line
 from sicp_postprocessors.val3 import Val3
 
@@ -27,19 +28,15 @@ class Bare(LinePostprocessor):
 
     name, summary, suffix, written_events = "bare", "a test", ".bare", frozenset[EventKind]()
 
-    def begin(self, program):
-        return []
-
     def comment(self, text):
         return f"' {text}"
 
-    def move(self, move, previous):
-        return [f"MOVE {move.index}"]
+    def move_joint(self, moves):
+        return [f"MOVE {index}" for index in moves.index]
 
-    def event(self, event):
-        return []
+    move_linear = move_joint
 
-    def end(self, program):
+    def finish(self, program):
         return ["END"]
 
 
