@@ -17,6 +17,7 @@ from sicp_cam.errors import InputError, printable
 from sicp_cam.job.input_files import is_pose
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import Contour, FloatArray, Source, ToolPath
+from sicp_cam.path_facts import bounds, feed_facts, rounded
 from sicp_cam.registration.scan_surface import ScanSurface, prepared
 from sicp_cam.result_document import findings_list, input_entry
 
@@ -30,7 +31,6 @@ LEAST_POINTS = 5
 """A scan of fewer points has no spacing: that is measured at the fourth neighbour."""
 SKIN_RING_STEP_MM = 20.0
 """A contour with fewer points beside it than one in so many millimetres bounds a face too narrow to be a skin."""
-FEEDS_LISTED = 20
 ONE_SIDE = 0.3
 """Length of the mean normal below which a contour looks to no one side; and the least share of an axis named."""
 
@@ -97,22 +97,13 @@ def _head(path: Path, role: str, source: Source | None, count: int, findings: An
     return {**entry, "path": str(path), "findings": findings_list((*taken, *findings))}
 
 
-def _rounded(values: FloatArray, decimals: int) -> Any:
-    """Return numbers as plain ones, without a negative zero."""
-    return (np.round(values, decimals) + 0.0).tolist()
-
-
-def _bounds(points_mm: FloatArray) -> dict[str, list[float]]:
-    return {"min_mm": _rounded(points_mm.min(axis=0), 4), "max_mm": _rounded(points_mm.max(axis=0), 4)}
-
-
 def _part_document(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, Any], Callable[[], Scene]]:
     part = plugins.read_part(path, **given)
     contours = contours_of(part)
     skins = [number for number, contour in enumerate(contours, 1) if _kind(contour) == "skin"]
     shown = skins or list(range(1, len(contours) + 1))
     document = _head(path, "part", part.source, len(contours), part.findings) | {
-        "bounds": _bounds(part.mesh.vertices_mm),
+        "bounds": bounds(part.mesh.vertices_mm),
         "triangles": len(part.mesh.faces),
         "contours": [_contour_entry(number, contour) for number, contour in enumerate(contours, 1)],
     }
@@ -145,8 +136,8 @@ def _contour_entry(number: int, contour: Contour) -> dict[str, Any]:
         "length_mm": round(contour.length_mm, 4),
         "closed": contour.closed,
         "corners": len(contour.corners),
-        "centre_mm": _rounded(contour.points_mm.mean(axis=0), 3),
-        "outward": _rounded(outward, 3),
+        "centre_mm": rounded(contour.points_mm.mean(axis=0), 3),
+        "outward": rounded(outward, 3),
         "looks": _looks(outward),
     }
 
@@ -189,7 +180,7 @@ def _scan_document(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, Any]
     surface = prepared(scan) if len(scan.points_mm) >= LEAST_POINTS else None
     loops = _scan_loops(surface) if surface else []
     document = _head(path, "scan", scan.source, len(scan.points_mm), scan.findings) | {
-        "bounds": _bounds(scan.points_mm),
+        "bounds": bounds(scan.points_mm),
         "triangles": 0 if scan.faces is None else len(scan.faces),
         "normals": scan.normals is not None,
         "columns": [*scan.columns],
@@ -207,18 +198,16 @@ def _scan_document(path: Path, given: Mapping[str, Any]) -> tuple[dict[str, Any]
 
 def _loop_entry(number: int, loop: FloatArray) -> dict[str, Any]:
     length_mm = resampled(loop, 1)[1]
-    return {"number": number, "length_mm": round(length_mm, 1), "centre_mm": _rounded(loop.mean(axis=0), 2)}
+    return {"number": number, "length_mm": round(length_mm, 1), "centre_mm": rounded(loop.mean(axis=0), 2)}
 
 
 def _path_document(path: Path, tool_path: ToolPath) -> dict[str, Any]:
-    feeds = np.unique(tool_path.feeds_mm_min[~tool_path.rapid & (tool_path.feeds_mm_min > 0.0)])
     return _head(path, "path", tool_path.source, len(tool_path), tool_path.findings) | {
-        "bounds": _bounds(tool_path.tips_mm),
+        "bounds": bounds(tool_path.tips_mm),
         "name": tool_path.name,
         "rapid_moves": int(tool_path.rapid.sum()),
         "feed_moves": int((~tool_path.rapid).sum()),
-        "different_feeds": len(feeds),
-        "feeds_mm_min": _rounded(feeds[:FEEDS_LISTED], 4),
+        **feed_facts(tool_path),
         "length_mm": round(float(np.linalg.norm(np.diff(tool_path.tips_mm, axis=0), axis=1).sum()), 3),
         "events": dict(Counter(event.kind.value for event in tool_path.events)),
     }

@@ -14,6 +14,7 @@ COMMANDS = {
     "correct": ("sicp_cam.cli.correct:correct", "Correct a tool path to the scanned shape and write robot programs."),
     "inspect": ("sicp_cam.cli.inspect:inspect", "Say what is in a scan, a part or a path."),
     "convert": ("sicp_cam.cli.convert:convert", "Write a scan, a mesh or a path in another format, uncorrected."),
+    "check": ("sicp_cam.cli.check:check", "Read written programs back and tell what is wrong with them."),
     "plugins": ("sicp_cam.cli.plugins_command:plugins", "List who reads and writes what, and what each one takes."),
     "settings": ("sicp_cam.cli.settings_command:settings", "List what a job may set, with types and defaults."),
     "doctor": ("sicp_cam.cli.doctor:doctor", "Say what this machine has, and what it lacks."),

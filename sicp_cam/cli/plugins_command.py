@@ -29,14 +29,14 @@ def plugins(
     as_json: Annotated[bool, Parameter(name="--json", negative="", show_default=False)] = False,
     talk: Talk = Talk(),  # noqa: B008  # frozen
 ) -> int:
-    """List readers and writers of scans, parts and paths, and postprocessors, with the distributions they come from.
+    """List readers and writers of scans, parts and paths, postprocessors and checkers of programs, and whose they are.
 
     With a name, list the options of that one instead, with types, defaults and the flag that sets each.
 
     Parameters
     ----------
     name
-        A postprocessor such as val3, or a reader such as scan.asc or path.nc.
+        A postprocessor such as val3, a reader such as scan.asc or path.nc, or a checker such as check.nc.
     check
         Also import each one; exit code 2 if one cannot be imported, or two claim the same name.
     as_json
@@ -74,13 +74,13 @@ def _listed(check: bool, as_json: bool) -> int:
 
 
 def _table(found: Iterable[Plugin]) -> Iterator[str]:
-    from sicp_cam.plugins.registry import POSTPROCESSORS, WRITERS
+    from sicp_cam.plugins.registry import CHECKERS, POSTPROCESSORS, WRITERS
 
-    kinds = {POSTPROCESSORS: "post", WRITERS: "write {}"}
+    kinds = {POSTPROCESSORS: "post", WRITERS: "write {}", CHECKERS: "check"}
     rows = [
         (
             kinds.get(plugin.group, "{}").format(plugin.name.partition(".")[0]),
-            plugin.name if plugin.group == POSTPROCESSORS else f".{plugin.name.partition('.')[2]}",
+            plugin.name if plugin.group == POSTPROCESSORS else f".{plugin.name.partition('.')[2] or plugin.name}",
             plugin.value,
             plugin.owner + (" (override)" if plugin.override else ""),
         )
@@ -128,12 +128,14 @@ def _description(one: PluginOptions) -> Iterator[str]:
 
     plugin = one.plugin
     role = plugin.name.partition(".")[0]
-    kind = {"post": "postprocessor", "out": f"writer of a {role}"}.get(one.role, f"reader of a {role}")
+    kinds = {"post": "postprocessor", "out": f"writer of a {role}", "check": "checker of programs with that suffix"}
+    kind = kinds.get(one.role, f"reader of a {role}")
     yield f"{plugin.name}: {kind}, {plugin.value}, from {plugin.owner}"
     if one.summary:
         yield printable(one.summary)
     if one.options:
-        where = f"as below, in a job file in the table [options.{one.prefix}]" if one.role != "out" else "of convert"
+        of_job = f"as below, in a job file in the table [options.{one.prefix}]"
+        where = {"out": "of convert", "check": "of check"}.get(one.role, of_job)
         yield f"on the command line {where}:"
     yield from option_lines(one.options, f"--set {one.prefix}.")
     if one.any_option:

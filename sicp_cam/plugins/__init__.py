@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sicp_cam.model import Part, Scan, ToolPath
 
 __all__ = [
+    "arguments_for",
     "check_reader",
     "encoded",
     "postprocessor",
@@ -225,7 +226,7 @@ def encoded(
             f" writable: {known or 'none'}"
         )
     function = owner(claims[name]).load()
-    content: bytes = function(thing, unit=unit, **_arguments("out", function, options))
+    content: bytes = function(thing, unit=unit, **arguments_for("out", function, options))
     return content
 
 
@@ -286,17 +287,31 @@ def _ready(role: str, path: Path, options: Mapping[str, object]) -> tuple[Callab
         raise JobError(f"{role}.format: must be a suffix such as 'csv', not {printable(str(suffix), 40)}")
     function = reader(role, path, suffix=suffix)
     rest = {key: value for key, value in options.items() if key != "format"}
-    return function, _arguments(role, function, rest)
+    return function, arguments_for(role, function, rest)
 
 
-def _arguments(role: str, function: Callable[..., Any], options: Mapping[str, object]) -> dict[str, Any]:
+def arguments_for(role: str, function: Callable[..., Any], options: Mapping[str, object]) -> dict[str, Any]:
+    """Return the options of a reader, writer or checker in the types that it wants.
+
+    Parameters
+    ----------
+    role
+        One of `ROLES`, `out` for a writer, or `check` for a checker: what stands before the name in a message.
+    function, options
+        Who takes them, and what is stated.
+
+    Raises
+    ------
+    JobError
+        If some are unknown or of a wrong type; all of them at once.
+    """
     known = keyword_names(function)
     taken = inspect.signature(function).parameters.keys() - set(known)
     hints = annotations_of(function) if options else {}
     arguments, problems = {}, []
     for key, value in options.items():
         if key not in known and (not takes_any(function) or key in taken):
-            near = nearest(key, known if role == "out" else [*known, "format"])
+            near = nearest(key, [*known, "format"] if role in ROLES else known)
             problems.append(f"{role}.{printable(key)}: unknown option; {near}")
             continue
         try:

@@ -10,7 +10,7 @@ from typing import Any
 from sicp_cam.errors import JobError, printable
 from sicp_cam.options.help import Option, dataclass_options, function_options, summary
 from sicp_cam.options.values import nearest
-from sicp_cam.plugins.registry import FORMATS, POSTPROCESSORS, ROLES, WRITERS, Plugin, owner, owners
+from sicp_cam.plugins.registry import CHECKERS, FORMATS, POSTPROCESSORS, ROLES, WRITERS, Plugin, owner, owners
 
 __all__ = ["PluginOptions", "keyword_names", "plugin_options", "takes_any", "with_name"]
 
@@ -27,7 +27,7 @@ class PluginOptions:
     plugin
         Which one.
     role
-        One of `ROLES`, `post`, or `out` for a writer.
+        One of `ROLES`, `post`, `out` for a writer, or `check` for a checker.
     summary
         What it is, in one line.
     options
@@ -60,6 +60,8 @@ def with_name(name: str) -> tuple[Plugin, ...]:
     suffix = name.removeprefix(".").lower()
     wanted = dict.fromkeys([name, name.lower(), *(f"{role}.{suffix}" for role in ROLES)])
     found = [owner(claims[key]) for key in wanted for claims in groups if key in claims]
+    checkers, checked = owners(CHECKERS), suffix.removeprefix("check.")
+    found += [owner(checkers[checked])] if checked in checkers else []
     if not found:
         raise JobError(f"no plug-in '{printable(name, 60)}'; {nearest(name, {key for each in groups for key in each})}")
     return tuple(found)
@@ -77,9 +79,10 @@ def plugin_options(plugin: Plugin) -> PluginOptions:
     if plugin.group == FORMATS:
         taken = (_FORMAT, *function_options(thing, keyword_names(thing)))
         return PluginOptions(plugin, plugin.name.partition(".")[0], summary(thing), taken, takes_any(thing))
-    if plugin.group == WRITERS:
+    if plugin.group in (WRITERS, CHECKERS):
+        role = "out" if plugin.group == WRITERS else "check"
         return PluginOptions(
-            plugin, "out", summary(thing), function_options(thing, keyword_names(thing)), takes_any(thing)
+            plugin, role, summary(thing), function_options(thing, keyword_names(thing)), takes_any(thing)
         )
     kind = getattr(thing, "Options", None)
     told = str(getattr(thing, "summary", "") or summary(thing))

@@ -3,8 +3,9 @@
 Entry-point group `sicp_cam.formats`: the name is `role.suffix` with a role of `ROLES`, the value a function
 `read(path, *, units, limits, **options)`; one that can repair damaged files also takes `recover`. Group
 `sicp_cam.writers`: `role.suffix` with the role scan or part, the value a function `write(thing, *, unit, **options)`
-that returns bytes. Group `sicp_cam.postprocessors`: the value is a `Postprocessor` class. A name that another
-distribution owns is taken over only through the group with `.override` appended.
+that returns bytes. Group `sicp_cam.postprocessors`: the value is a `Postprocessor` class. Group `sicp_cam.checkers`:
+the name is a suffix, the value a function `check(path, *, limits, **options)` that returns findings. A name that
+another distribution owns is taken over only through the group with `.override` appended.
 """
 
 from __future__ import annotations
@@ -16,11 +17,23 @@ from typing import Any
 from sicp_cam.errors import JobError, printable
 from sicp_cam.findings import Finding, Level
 
-__all__ = ["FORMATS", "POSTPROCESSORS", "ROLES", "WRITERS", "Plugin", "broken", "listing", "owner", "owners"]
+__all__ = [
+    "CHECKERS",
+    "FORMATS",
+    "POSTPROCESSORS",
+    "ROLES",
+    "WRITERS",
+    "Plugin",
+    "broken",
+    "listing",
+    "owner",
+    "owners",
+]
 
 FORMATS = "sicp_cam.formats"
 POSTPROCESSORS = "sicp_cam.postprocessors"
 WRITERS = "sicp_cam.writers"
+CHECKERS = "sicp_cam.checkers"
 ROLES = ("scan", "part", "path")
 
 
@@ -31,9 +44,9 @@ class Plugin:
     Parameters
     ----------
     group
-        `FORMATS`, `WRITERS` or `POSTPROCESSORS`.
+        `FORMATS`, `WRITERS`, `POSTPROCESSORS` or `CHECKERS`.
     name
-        `role.suffix`, or the name of a post.
+        `role.suffix`, the name of a post, or the suffix that a checker judges.
     value
         `module:attribute`.
     owner
@@ -70,7 +83,7 @@ def listing() -> tuple[tuple[Plugin, ...], tuple[Finding, ...]]:
     """Return every registered plug-in, in order of name, and what is wrong with the registration; imports none."""
     plugins: list[Plugin] = []
     findings: list[Finding] = []
-    for group in (FORMATS, WRITERS, POSTPROCESSORS):
+    for group in (FORMATS, WRITERS, POSTPROCESSORS, CHECKERS):
         for name, claims in sorted(owners(group).items()):
             plugins += claims
             findings += _registration_findings(group, name, claims)
@@ -133,7 +146,7 @@ def _registration_findings(group: str, name: str, claims: list[Plugin]) -> list[
     except JobError as error:
         findings.append(Finding(801, Level.WARN, str(error), name))
     role, _, suffix = name.partition(".")
-    if group != POSTPROCESSORS and (role not in ROLES or not suffix):
+    if group in (FORMATS, WRITERS) and (role not in ROLES or not suffix):
         message = f"{name} from {claims[0].owner}: not of the form role.suffix with role {', '.join(ROLES)}; never used"
         findings.append(Finding(804, Level.WARN, message, name))
     return findings

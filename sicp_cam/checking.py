@@ -1,0 +1,291 @@
+"""Check written programs: find them, read each back, judge its text and its path, and compare it with another one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from sicp_cam import plugins
+from sicp_cam.errors import InputError, JobError, printable
+from sicp_cam.findings import Finding, Level
+from sicp_cam.job.input_files import absent
+from sicp_cam.limits import DEFAULT_LIMITS, Limits
+from sicp_cam.model import ToolPath
+from sicp_cam.options.values import nearest, table
+from sicp_cam.path_comparison import Comparison, compared
+from sicp_cam.path_facts import path_facts
+from sicp_cam.path_review import ReviewLimits, review
+from sicp_cam.plugins.checkers import check_program, checker, options_taken
+from sicp_cam.result_document import SCHEMA, findings_list, input_entry, versions
+from sicp_cam.result_document import status as worst_of
+
+__all__ = ["Check", "check", "programs_of"]
+
+Options = Mapping[str, object]
+
+NOT_JUDGED, UNREADABLE = 899, 903
+"""Codes of the findings: the text of the program was judged by nobody; the program cannot be read."""
+
+_MANIFEST = "result.json"
+_MANIFEST_BYTES = 2**26
+
+
+def _none() -> Options:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """What is to be checked.
+
+    Parameters
+    ----------
+    targets
+        Programs, or folders of programs, see `programs_of`.
+    units
+        Unit of programs that state none.
+    against
+        Another program of the same path, in the same frame, that each one is compared with.
+    tolerance_mm, tolerance_deg
+        How far tips and tool axes may be off from that.
+    path_options, check_options, against_options
+        What the readers, the checkers and `ReviewLimits`, and the reader of `against` take by name.
+    limits
+        Caps that readers and checkers keep.
+    strict
+        True if a warning is to end the check with exit code 7.
+    """
+
+    targets: tuple[Path, ...]
+    units: str | None = None
+    against: Path | None = None
+    tolerance_mm: float = 0.002
+    tolerance_deg: float = 0.002
+    path_options: Options = field(default_factory=_none)
+    check_options: Options = field(default_factory=_none)
+    against_options: Options = field(default_factory=_none)
+    limits: Limits = DEFAULT_LIMITS
+    strict: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Judged:
+    """One program: what was read, None if it could not be, and what is to be told."""
+
+    file: Path
+    path: ToolPath | None
+    findings: tuple[Finding, ...]
+    comparison: Comparison | None = None
+
+
+def check(job: Check) -> dict[str, Any]:
+    """Check programs and return the document of the result.
+
+    Returns
+    -------
+    dict
+        `status`, `exit_code` (3 if a program cannot be read, 5 if one must not run, 7 for warnings if `strict`),
+        `findings`, `inputs`, and for each program `facts`, see `path_facts`, and its findings.
+
+    Raises
+    ------
+    JobError
+        If an option is wrong, or a folder holds no program.
+    InputError
+        If `against` cannot be read.
+    """
+    files = [file for target in job.targets for file in programs_of(target)]
+    limits, rest = _review_limits(job.check_options)
+    shared = _Shared(job, limits, _divided(files, job, rest), _reference(job))
+    judged = [_judged(file, shared) for file in files if job.against is None or not _same(file, job.against)]
+    if not judged:
+        raise JobError(f"--against {printable(str(job.against))}: that is the only program; name another one to check")
+    findings = [finding for each in judged for finding in each.findings]
+    return {
+        "schema": SCHEMA,
+        "status": worst_of(findings, ()),
+        "exit_code": _exit_code(judged, strict=job.strict),
+        "findings": findings_list(findings),
+        "inputs": [
+            {**input_entry("path", each.path.source, len(each.path)), "path": str(each.file)}
+            for each in judged
+            if each.path is not None
+        ],
+        "programs": [_entry(each) for each in judged],
+        "versions": dict(versions()),
+    }
+
+
+def programs_of(target: Path) -> tuple[Path, ...]:
+    """Return the programs that a file or folder holds, in order of name.
+
+    A folder is a VAL3 application if a .pjx file lies in it, or holds results if it has a result.json; of other
+    folders nobody knows which files are meant.
+
+    Raises
+    ------
+    InputError
+        If it does not exist, or is another folder.
+    """
+    name = printable(str(target))
+    if not target.is_dir():
+        if not target.exists():
+            raise InputError(f"{name}: {absent(target)}")
+        return (target,)
+    applications = sorted(file for file in target.iterdir() if file.suffix.lower() == ".pjx" and file.is_file())
+    if applications:
+        return tuple(applications)
+    if (target / _MANIFEST).is_file():
+        return _written(target)
+    raise InputError(f"{name}: a folder with neither a .pjx nor a {_MANIFEST}; name the programs in it")
+
+
+def _written(folder: Path) -> tuple[Path, ...]:
+    """Return the programs that the result of a run names and that a reader knows; of a VAL3 application its .pjx."""
+    manifest = folder / _MANIFEST
+    name = printable(str(manifest))
+    try:
+        if manifest.stat().st_size > _MANIFEST_BYTES:
+            raise InputError(f"{name}: larger than {_MANIFEST_BYTES} bytes, so it is no result of a run")
+        outputs = json.loads(manifest.read_text(encoding="utf-8"))["outputs"]
+        names = [str(entry["path"]) for entry in outputs if entry["kind"] == "program"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputError(f"{name}: is no result of a run; name the programs in the folder") from error
+    files = [folder / name for name in names if _is_below(name)]
+    of_project = {file.parent for file in files if plugins.suffix_of(file) == "pjx"}
+    found = [file for file in files if "path" in plugins.roles(file) and _begins(file, of_project)]
+    if not found:
+        raise InputError(f"{name}: names no program that can be read; name the programs in the folder")
+    return tuple(sorted(found))
+
+
+def _is_below(name: str) -> bool:
+    path = Path(name)
+    return not path.is_absolute() and ".." not in path.parts
+
+
+def _begins(file: Path, of_project: set[Path]) -> bool:
+    """Say whether a file is the one to read a program by."""
+    return plugins.suffix_of(file) == "pjx" or not any(folder in of_project for folder in file.parents)
+
+
+# --- options ---
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shared:
+    """What holds for every program: the job, limits, options of its reader and checker by file, and the reference."""
+
+    job: Check
+    limits: ReviewLimits
+    options: Mapping[Path, tuple[Options, Options]]
+    reference: ToolPath | None
+
+
+def _review_limits(options: Options) -> tuple[ReviewLimits, dict[str, object]]:
+    own = {each.name for each in fields(ReviewLimits)}
+    limits, problems = table(ReviewLimits, {key: value for key, value in options.items() if key in own})
+    if limits is None:
+        raise JobError(*(f"check.{key}: {problem}" for key, problem in problems.items()))
+    return limits, {key: value for key, value in options.items() if key not in own}
+
+
+def _divided(files: list[Path], job: Check, rest: Options) -> dict[Path, tuple[Options, Options]]:
+    """Return what each file's reader and checker take; of one file all, as they say best what they do not know.
+
+    Raises
+    ------
+    JobError
+        If nobody takes an option.
+    """
+    suffix = job.path_options.get("format")
+    named = str(suffix) if suffix is not None else None
+    judges = {file: checker(file, suffix=named) for file in files}
+    if len(files) == 1:
+        _refuse_unknown(rest, set() if judges[files[0]] is None else set(rest))
+        return {files[0]: (job.path_options, rest)}
+    readers = {file: plugins.reader("path", file, suffix=named) for file in files if "path" in plugins.roles(file)}
+    reading = {file: {"format", *options_taken(function, job.path_options)} for file, function in readers.items()}
+    judging = {file: options_taken(function, rest) for file, function in judges.items() if function is not None}
+    _refuse_unknown(job.path_options, set().union(*reading.values()), "path")
+    _refuse_unknown(rest, set().union(*judging.values()))
+    return {
+        file: (_only(job.path_options, reading.get(file, set())), _only(rest, judging.get(file, set())))
+        for file in files
+    }
+
+
+def _refuse_unknown(options: Iterable[str], taken: set[str], prefix: str = "check") -> None:
+    own = [each.name for each in fields(ReviewLimits)] if prefix == "check" else []
+    unknown = [key for key in options if key not in taken]
+    if unknown:
+        raise JobError(*(f"{prefix}.{printable(key)}: unknown option; {nearest(key, own)}" for key in unknown))
+
+
+def _only(options: Options, names: set[str]) -> Options:
+    return {key: value for key, value in options.items() if key in names}
+
+
+def _reference(job: Check) -> ToolPath | None:
+    if job.against is None:
+        return None
+    return plugins.read_path(job.against, units=job.units, limits=job.limits, options=job.against_options)
+
+
+def _same(file: Path, other: Path) -> bool:
+    return other.exists() and file.exists() and file.samefile(other)
+
+
+# --- one program ---
+
+
+def _judged(file: Path, shared: _Shared) -> _Judged:
+    job = shared.job
+    reading, judging = shared.options[file]
+    findings: list[Finding] = []
+    try:
+        findings += _text_findings(file, job, judging)
+        path = plugins.read_path(file, units=job.units, limits=job.limits, options=reading)
+    except InputError as error:
+        findings.append(Finding(UNREADABLE, Level.FAIL, str(error)))
+        return _Judged(file, None, tuple(findings))
+    findings += [*path.findings, *review(path, shared.limits, str(file))]
+    if shared.reference is None:
+        return _Judged(file, path, tuple(findings))
+    comparison = compared(
+        path, shared.reference, str(file), tolerance_mm=job.tolerance_mm, tolerance_deg=job.tolerance_deg
+    )
+    return _Judged(file, path, (*findings, *comparison.findings), comparison)
+
+
+def _text_findings(file: Path, job: Check, options: Options) -> Iterator[Finding]:
+    suffix = job.path_options.get("format")
+    function = checker(file, suffix=str(suffix) if suffix is not None else None)
+    if function is not None:
+        yield from check_program(function, file, limits=job.limits, options=options)
+        return
+    what = "no checker knows the words of this format; only the path in it was judged"
+    yield Finding(NOT_JUDGED, Level.INFO, what, printable(str(file)))
+
+
+def _entry(judged: _Judged) -> dict[str, Any]:
+    return {
+        "path": str(judged.file),
+        "status": worst_of(judged.findings, ()),
+        "facts": None if judged.path is None else path_facts(judged.path),
+        "against": None if judged.comparison is None else judged.comparison.facts,
+        "findings": findings_list(judged.findings),
+    }
+
+
+def _exit_code(judged: list[_Judged], *, strict: bool) -> int:
+    levels = {finding.level for each in judged for finding in each.findings}
+    if any(each.path is None for each in judged):
+        return InputError.exit_code
+    if Level.FAIL in levels:
+        return 5
+    return 7 if strict and Level.WARN in levels else 0
