@@ -420,10 +420,10 @@ def test_the_block_of_the_sample_job_holds_when_its_marks_are_taken_away(tmp_pat
     text = "\n".join([*lines[:block], *(line.removeprefix("# ") for line in lines[block:])])
     (tmp_path / "job.toml").write_text(text, encoding="utf-8")
     options = build(load(tmp_path / "job.toml")).post_options["val3"]
-    assert list(options) == ["tool", "cell", "spindle_link", "first_run"]
+    assert list(options) == ["tool", "cell", "spindle_output", "first_run"]
     made = plugins.postprocessor("val3", options).options
     assert made.tool == (0.0, 0.0, 185.0, 0.0, 0.0, 0.0)
-    assert (made.spindle_link, made.first_run) == ("BasicIO-1\\%Q0", True)
+    assert (made.spindle_output, made.first_run) == ("BasicIO-1\\%Q0", True)
 
 
 JUNK = st.recursive(

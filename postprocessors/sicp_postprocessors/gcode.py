@@ -131,7 +131,7 @@ class GCode(LinePostprocessor):
         if self.options.dialect.percent:
             yield "%"
 
-    def orientations(self, program: Program) -> FloatArray:
+    def targets(self, program: Program) -> FloatArray:
         """Return the axes (n, 3) of every move, or its two rotary angles (n, 2) in degrees.
 
         Raises
@@ -156,7 +156,7 @@ class GCode(LinePostprocessor):
             "rotary": f"{options.kinematics[0]}{{:.{angle}}} C{{:.{angle}}}",
         }[options.orientation]
         feeds = self._feed_words(moves)
-        return rows(f"{code} {tips} {turn}{{}}", *(moves.tips_mm / factor).T, *moves.orientations.T, words(feeds))
+        return rows(f"{code} {tips} {turn}{{}}", *(moves.tips_mm / factor).T, *moves.targets.T, words(feeds))
 
     def _feed_words(self, moves: Moves) -> list[str]:
         decimals, factor = _FEED_DECIMALS[self.options.units], mm_per_unit(self.options.units)

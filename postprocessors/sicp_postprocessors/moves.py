@@ -24,15 +24,15 @@ class Moves:
     tips_mm, axes
         (n, 3) target of the tip, and unit vector from tip to holder, in the program frame.
     feeds_mm_min
-        (n,) speed of the tip; for rapid moves that of `rapid_feed_mm_min`, 0 where the controller has its own.
+        (n,) speed of the tip as `feeds_mm_min` gives it; 0 for rapid moves of controllers that have a speed for them.
     zones_mm
         (n,) distance from the target at which the move may bend into the next; 0 to come to rest there.
     rapid
         (n,) True where the tool does not cut.
     tools
         (n,) number of the tool in use, -1 where the path has not named any.
-    orientations
-        (n, ...) what `orientations` returned for these moves.
+    targets
+        (n, ...) what `targets` returned for these moves.
     states_feed, states_zone
         (n,) True where feed or zone differ from what holds before: the first move of its kind in a program file, and
         wherever they change.
@@ -45,7 +45,7 @@ class Moves:
     zones_mm: FloatArray
     rapid: BoolArray
     tools: IntArray
-    orientations: FloatArray
+    targets: FloatArray
     states_feed: BoolArray
     states_zone: BoolArray
 

@@ -113,7 +113,7 @@ class LinePostprocessor(Postprocessor):
     written_events: ClassVar[frozenset[EventKind]] = frozenset(EventKind) - {EventKind.OTHER}
     """Kinds of events that the verbs have words for."""
     straight_rapids: ClassVar[bool] = False
-    """True: rapid moves are straight, at `rapid_feed_mm_min`; only the first move may go any way through space."""
+    """True: rapid moves are straight, at a speed of `feeds_mm_min`; only the first move may go any way in space."""
     modal_speed: ClassVar[bool] = False
     """True: a feed holds until the next, and `speed` states it; False: moves state their feed themselves."""
     modal_zone: ClassVar[bool] = False
@@ -195,13 +195,16 @@ class LinePostprocessor(Postprocessor):
         """Return what the head says beyond name, notes and safety line; text of any length."""
         return ()
 
-    def orientations(self, program: Program) -> FloatArray:
-        """Return what the controller turns the tool by, one row a move: by default the axes (n, 3)."""
+    def targets(self, program: Program) -> FloatArray:
+        """Return what only the path as a whole tells of each move, one row a move: by default the axes (n, 3).
+
+        Angles that must not jump, the number of a point in its array: the verbs of motion find their rows in `Moves`.
+        """
         return program.path.axes
 
-    def rapid_feed_mm_min(self) -> float:
-        """Return the speed of straight rapid moves."""
-        return 0.0
+    def feeds_mm_min(self, path: ToolPath) -> FloatArray:
+        """Return the speed of each move (n,)."""
+        return path.feeds_mm_min
 
     def zones_mm(self, path: ToolPath) -> FloatArray:
         """Return how far from its target each move may bend into the next (n,)."""
@@ -310,10 +313,7 @@ class LinePostprocessor(Postprocessor):
 
     def _moves(self, program: Program, parts: Sequence[range], joint: BoolArray) -> Moves:
         path = program.path
-        feeds = path.feeds_mm_min
-        if self.straight_rapids:
-            feeds = np.where(path.rapid, self.rapid_feed_mm_min(), feeds)
-        zones, starts = self.zones_mm(path), [part.start for part in parts]
+        feeds, zones, starts = self.feeds_mm_min(path), self.zones_mm(path), [part.start for part in parts]
         # A rapid move at the control's own speed leaves it open which feed holds behind it: that is stated again.
         feed_known = ~joint
         return Moves(
@@ -324,7 +324,7 @@ class LinePostprocessor(Postprocessor):
             zones,
             path.rapid,
             tools_in_use(path),
-            self.orientations(program),
+            self.targets(program),
             _changes(feeds.round(_FEED_DECIMALS), starts, feed_known) & feed_known,
             _changes(zones, starts, np.ones(len(path), np.bool_)),
         )

@@ -306,8 +306,8 @@ class TestTemplate:
         class Robot(Plain):
             straight_rapids = True
 
-            def rapid_feed_mm_min(self):
-                return 15000.0
+            def feeds_mm_min(self, path):
+                return np.where(path.rapid, 15000.0, path.feeds_mm_min)
 
         lines = body(Robot(), straight_program(4, feed=[0, 600, 0, 600], rapid=[1, 0, 1, 0]))
         speeds = ["speed 600", "linear 1", "speed 15000", "linear 2", "speed 600", "linear 3"]

@@ -10,9 +10,8 @@ from sicp_cam.errors import JobError, OutputError, PathError
 from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind
 from sicp_postprocessors.val3 import Val3, application_name
-from sicp_postprocessors.val3_code import programs_of
-from sicp_postprocessors.val3_motion import path_angles
-from sicp_postprocessors.val3_poses import (
+from sicp_postprocessors.moves import divided_at_retracts
+from sicp_postprocessors.orientations import (
     angles_from_axes,
     euler_angles,
     flange_turns_deg,
@@ -20,7 +19,7 @@ from sicp_postprocessors.val3_poses import (
     rotation_matrices,
     six_from_pose,
 )
-from sicp_postprocessors.val3_xml import Variable, data_file, program_file
+from sicp_postprocessors.val3.xml import Variable, data_file, program_file
 
 MOVES = ("movej", "movel")
 TEST_VECTOR = np.array(
@@ -169,7 +168,7 @@ class TestProgram:
         }  # fmt: skip
 
     def test_first_run_caps_every_speed_and_blends_nothing(self):
-        post = Val3({"first_run": True, "first_run_mm_s": 20, "blend": "Cartesian"})
+        post = Val3({"first_run": True, "first_run_mm_s": 20, "blend": "true"})
         app, result = read_val3(post.write(simple_program()))
         moves = [value["mdesc"] for kind, value in result.actions if kind in MOVES]
         assert [float(m["tmax"]) for m in moves] == [20, 20, 20, 15, 15, 20]
@@ -337,7 +336,7 @@ class TestBlend:
     @pytest.mark.parametrize(
         ("options", "level", "flag"),
         [
-            ({"blend": "off"}, Level.WARN, "--set post.val3.blend=Cartesian"),
+            ({"blend": "off"}, Level.WARN, "--set post.val3.blend=true"),
             ({"first_run": True}, Level.INFO, "--set post.val3.first_run=false"),
             ({"first_run": True, "blend": "off"}, Level.INFO, "--set post.val3.first_run=false"),
         ],
@@ -389,7 +388,7 @@ class TestSpindleAndTools:
         assert "--set post.cell_2.spindle_speed=num" in told[634]
         links = [f.message for f in Cell().preflight(simple_program()) if f.code == 632]
         for kind, message in zip(("spindle", "coolant"), links, strict=True):
-            assert f"--set post.cell_2.{kind}_link=OUTPUT" in message
+            assert f"--set post.cell_2.{kind}_output=OUTPUT" in message
         plate = {"world_origin": "base_plate", "shoulder_height_mm": 375}
         assert any("taken as the robot's base plate" in f.message for f in Val3(plate).preflight(simple_program()))
 
@@ -397,8 +396,8 @@ class TestSpindleAndTools:
         options = {
             "tool": "0,0,100,0,0,0",
             "cell": "0,0,0,0,0,0",
-            "spindle_link": "BasicIO-1\\%Q0",
-            "coolant_link": "BasicIO-1\\%Q1",
+            "spindle_output": "BasicIO-1\\%Q0",
+            "coolant_output": "BasicIO-1\\%Q1",
             "spindle_speed": "num",
         }
         assert codes(Val3(options), simple_program()) == [610]
@@ -408,24 +407,24 @@ class TestSpindleAndTools:
     def test_counter_clockwise_needs_an_output(self):
         program = straight_program(3, events=(Event(1, EventKind.SPINDLE, -9000.0, line=4),))
         with pytest.raises(
-            PathError, match=r"before move 1, line 4: .*counter-clockwise.*--set post\.val3\.spindle_ccw_link="
+            PathError, match=r"before move 1, line 4: .*counter-clockwise.*--set post\.val3\.spindle_ccw_output="
         ):
             Val3().write(program)
-        app, result = read_val3(Val3({"spindle_ccw_link": "B\\%Q1"}).write(program))
+        app, result = read_val3(Val3({"spindle_ccw_output": "B\\%Q1"}).write(program))
         outputs = [value for kind, value in result.actions if kind == "output"]
         off = [("doSpindle", "false"), ("doSpindleCcw", "false")]
         assert outputs == [("doSpindle", "false"), ("doSpindleCcw", "true"), *off]
         assert app.code["stop"] == ["doSpindle=false", "doSpindleCcw=false"]
 
     def test_speed_by_analog_output(self):
-        options = {"spindle_speed": "aio", "spindle_speed_link": "B\\%A0", "spindle_speed_scale": 0.001}
+        options = {"spindle_speed": "aio", "spindle_speed_output": "B\\%A0", "spindle_speed_scale": 0.001}
         app, result = read_val3(Val3(options).write(simple_program()))
         assert ("analog", ("aoSpindle", "12")) in result.actions and app.types["aoSpindle"] == "aio"
 
     def test_an_analog_speed_without_its_scale_is_refused(self):
         """18000 rev/min must not become 18000 volts."""
         with pytest.raises(JobError, match=r"one rev/min; give --set post\.val3\.spindle_speed_scale="):
-            Val3({"spindle_speed": "aio", "spindle_speed_link": "B\\%A0"})
+            Val3({"spindle_speed": "aio", "spindle_speed_output": "B\\%A0"})
         with pytest.raises(JobError) as caught:
             Val3({"spindle_speed": "AIO"})
         assert len(caught.value.problems) == 2
@@ -440,7 +439,7 @@ class TestSpindleAndTools:
             Event(2, EventKind.SPINDLE, 6000.0),
         )
         program = straight_program(4, events=events)
-        _, result = read_val3(Val3({"continue_link": "B\\%I0"}).write(program))
+        _, result = read_val3(Val3({"continue_input": "B\\%I0"}).write(program))
         assert [v["tool"] for k, v in result.actions if k in MOVES] == ["tTool1"] * 2 + ["tTool2"] * 2
         change = result.actions.index(("comment", "tool 2"))
         assert result.actions[change - 1 : change + 4] == [
@@ -484,9 +483,9 @@ def test_application_names(name, written):
 @pytest.mark.parametrize(
     "options",
     [{"world_origin": "base_plate"}, {"shoulder_height_mm": 5}, {"spindle_speed": "aio"}, {"decimals": 3},
-     {"version": 's7"><x'}, {"tool": "1,2,3"}, {"max_moves_per_program": 0}, {"approach_vel_percent": 0},
-     {"blend": "joint"}, {"spindle_speed": "aio", "spindle_speed_link": "A", "spindle_speed_scale": 0},
-     {"spindle_link": "a\x01b"}],
+     {"version": 's7"><x'}, {"tool": "1,2,3"}, {"max_moves_per_program": 0}, {"approach_percent": 0},
+     {"blend": "joint"}, {"spindle_speed": "aio", "spindle_speed_output": "A", "spindle_speed_scale": 0},
+     {"spindle_output": "a\x01b"}],
 )  # fmt: skip
 def test_options_that_do_not_fit(options):
     with pytest.raises(JobError):
@@ -494,7 +493,7 @@ def test_options_that_do_not_fit(options):
 
 
 def test_links_are_escaped():
-    app = load_val3(Val3({"spindle_link": 'a"<&>\\%Q0'}).write(simple_program()))
+    app = load_val3(Val3({"spindle_output": 'a"<&>\\%Q0'}).write(simple_program()))
     assert app.data["doSpindle"] == [{"link": 'a"<&>\\%Q0'}]
 
 

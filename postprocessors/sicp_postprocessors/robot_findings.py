@@ -1,4 +1,4 @@
-"""What a robot operator must know or set before a VAL3 program runs.
+"""What a robot's operator must know or set before a program runs.
 
 Codes: 630 tool not given, 631 cell not given, 632 output not linked, 633 spindle direction, 634 spindle speed not
 commanded, 635 flange turns further than the tool axis, 636 tool change by hand, 637 cutting with the spindle off,
@@ -14,21 +14,12 @@ from sicp_cam.model import Event, EventKind, FloatArray, ToolPath
 from sicp_postprocessors.checks import event_place, move_place, stretch_findings
 from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.options import flag
-from sicp_postprocessors.rotary import axis_errors_deg
+from sicp_postprocessors.orientations import axis_errors_deg, flange_turns_deg, rotation_matrices
+from sicp_postprocessors.robot_options import RobotOptions
 from sicp_postprocessors.text import counted
-from sicp_postprocessors.val3_code import changes_tool_by_hand
-from sicp_postprocessors.val3_motion import blends_mm, passed_points
-from sicp_postprocessors.val3_options import Val3Options
-from sicp_postprocessors.val3_poses import flange_turns_deg, rotation_matrices
+from sicp_postprocessors.zones import passed_points
 
-__all__ = [
-    "axis_findings",
-    "cell_findings",
-    "flange_findings",
-    "spindle_findings",
-    "stop_findings",
-    "tool_findings",
-]
+__all__ = ["changes_tool_by_hand", "robot_findings"]
 
 _FLANGE_TURN_DEG = 30.0
 _AXIS_ERROR_DEG = 1e-3
@@ -36,7 +27,38 @@ _FEW_STOPS = 10
 _SIX = "x,y,z,rx,ry,rz"
 
 
-def cell_findings(path: ToolPath, options: Val3Options, post: str) -> list[Finding]:
+def robot_findings(
+    path: ToolPath, angles_deg: FloatArray, zones_mm: FloatArray, options: RobotOptions, post: str
+) -> list[Finding]:
+    """Return what the operator must set or know: tool, cell, outputs, spindle, tool changes, spin and stops.
+
+    Parameters
+    ----------
+    path
+        The path, which has passed the checks of every post.
+    angles_deg
+        (n, 3) rx, ry, rz of the tool.
+    zones_mm
+        (n,) zone of each move, 0 where the arm comes to rest.
+    options, post
+        Options and name of the post.
+    """
+    return [
+        *_cell_findings(path, options, post),
+        *_spindle_findings(path, options, post),
+        *_tool_findings(path, post),
+        *_axis_findings(path, angles_deg),
+        *_flange_findings(path, angles_deg, post),
+        *_stop_findings(path, zones_mm, options, post),
+    ]
+
+
+def changes_tool_by_hand(event: Event) -> bool:
+    """Say whether a tool is called after the path has begun: a robot has no word for it, so a person must act."""
+    return event.kind is EventKind.TOOL and event.before_move > 0
+
+
+def _cell_findings(path: ToolPath, options: RobotOptions, post: str) -> list[Finding]:
     """Tell what the program declares without knowing it: the tool, the place of the scan frame, the outputs."""
     findings = []
     if options.tool is None:
@@ -46,41 +68,39 @@ def cell_findings(path: ToolPath, options: Val3Options, post: str) -> list[Findi
         )
         findings.append(Finding(630, Level.WARN, message))
     if options.cell is None:
-        world = "world" if options.world_origin == "shoulder" else "base plate"
         message = (
-            f"no cell is given, so the scan frame is taken as the robot's {world}; give its pose there in mm and "
-            f"degrees with {flag(post, 'cell', _SIX)}"
+            "no cell is given, so the scan frame is taken as the robot's world; give its pose there in mm and degrees "
+            f"with {flag(post, 'cell', _SIX)}"
         )
         findings.append(Finding(631, Level.WARN, message))
-    links = {EventKind.SPINDLE: options.spindle_link, EventKind.COOLANT: options.coolant_link}
+    links = {EventKind.SPINDLE: options.spindle_output, EventKind.COOLANT: options.coolant_output}
     kinds = {event.kind for event in path.events}
     for kind, link in links.items():
         if kind in kinds and not link:
-            words = flag(post, f"{kind}_link", "OUTPUT")
-            message = f"the {kind} output is not linked; name it with {words}, or link it on the controller"
+            words = flag(post, f"{kind}_output", "OUTPUT")
+            message = f"no output is named that switches the {kind}; name it with {words}"
             findings.append(Finding(632, Level.WARN, message))
     return findings
 
 
-def spindle_findings(path: ToolPath, options: Val3Options, post: str) -> list[Finding]:
+def _spindle_findings(path: ToolPath, options: RobotOptions, post: str) -> list[Finding]:
     """Check the spindle: a direction that has an output, a speed that somebody sets, no cut while it stands."""
     findings = []
     starts = [event for event in path.events if event.kind is EventKind.SPINDLE and event.value != 0]
-    if not options.spindle_ccw_link:
-        words = flag(post, "spindle_ccw_link", "OUTPUT")
+    if not options.spindle_ccw_output:
+        words = flag(post, "spindle_ccw_output", "OUTPUT")
         message = f"the path turns the spindle counter-clockwise; name the output that does with {words}"
         findings += [Finding(633, Level.FAIL, message, event_place(e)) for e in starts if e.value < 0]
-    if options.spindle_speed == "none" and starts:
+    if starts and getattr(options, "spindle_speed", "none") == "none":
         speeds = ", ".join(f"{abs(speed):g}" for speed in dict.fromkeys(event.value for event in starts))
-        words = flag(post, "spindle_speed", "num")
-        message = f"the spindle speed is not commanded: set {speeds} rev/min at the drive, or {words} (or aio)"
+        message = f"the spindle speed is not commanded: set {speeds} rev/min at the drive"
         findings.append(Finding(634, Level.INFO, message))
     message = "cuts with the spindle off after a tool change; start the spindle in the path after the change"
     findings += [Finding(637, Level.FAIL, message, event_place(e)) for e in _changes_without_restart(path)]
     return findings
 
 
-def tool_findings(path: ToolPath, post: str) -> list[Finding]:
+def _tool_findings(path: ToolPath, post: str) -> list[Finding]:
     """Tell of tool changes, which a person makes, and of tools that share one declared pose."""
     calls = [event for event in events_in_order(path) if event.kind is EventKind.TOOL]
     message = "tool change: the program waits until the operator has changed the tool"
@@ -94,14 +114,14 @@ def tool_findings(path: ToolPath, post: str) -> list[Finding]:
     return findings
 
 
-def axis_findings(path: ToolPath, angles_deg: FloatArray) -> list[Finding]:
+def _axis_findings(path: ToolPath, angles_deg: FloatArray) -> list[Finding]:
     """Check by the controller's own formula that rx, ry, rz (n, 3) turn the tool's Z against the axis of each move."""
     errors = axis_errors_deg(path.axes, -rotation_matrices(angles_deg)[:, :, 2])
     message = f"rx, ry, rz miss the tool axis by more than {_AXIS_ERROR_DEG:g} degrees; report this"
     return stretch_findings(path, errors > _AXIS_ERROR_DEG, 640, Level.FAIL, message)
 
 
-def flange_findings(path: ToolPath, angles_deg: FloatArray, post: str) -> list[Finding]:
+def _flange_findings(path: ToolPath, angles_deg: FloatArray, post: str) -> list[Finding]:
     """Tell of moves in which the flange swings about the tool although the tool axis hardly moves."""
     swings = flange_turns_deg(angles_deg) > _FLANGE_TURN_DEG
     words = flag(post, "spin", "transport")
@@ -109,9 +129,9 @@ def flange_findings(path: ToolPath, angles_deg: FloatArray, post: str) -> list[F
     return stretch_findings(path, swings & ~path.rapid, 635, Level.WARN, message)
 
 
-def stop_findings(path: ToolPath, options: Val3Options, post: str) -> list[Finding]:
+def _stop_findings(path: ToolPath, zones_mm: FloatArray, options: RobotOptions, post: str) -> list[Finding]:
     """Tell how often the robot stops within cuts, where nothing in the path asks for it."""
-    stops = np.flatnonzero(passed_points(path) & (blends_mm(path, options) == 0.0))
+    stops = np.flatnonzero(passed_points(path) & (zones_mm == 0.0))
     told = f"the robot stops at {counted(len(stops), 'point')} between cutting moves"
     where = move_place(path, int(stops[0]), int(stops[-1])) if len(stops) else ""
     if options.blends:
@@ -122,7 +142,7 @@ def stop_findings(path: ToolPath, options: Val3Options, post: str) -> list[Findi
     if options.first_run:
         words = flag(post, "first_run", "false")
         return [Finding(639, Level.INFO, f"{told}, as a first run does; production: {words}", where)]
-    return [Finding(639, Level.WARN, f"{told}; let it run through with {flag(post, 'blend', 'Cartesian')}", where)]
+    return [Finding(639, Level.WARN, f"{told}; let it run through with {flag(post, 'blend', 'true')}", where)]
 
 
 def _changes_without_restart(path: ToolPath) -> list[Event]:

@@ -1,7 +1,9 @@
-"""Orientations as VAL3 writes them: R = Rx(rx) Ry(ry) Rz(rz), in degrees.
+"""Orientations of robot tools: a tool axis leaves the spin about itself free, and each controller writes turns anew.
 
-The tool's Z axis is (sin ry, -sin rx cos ry, cos rx cos ry): it fixes rx and ry, and leaves rz as free spin. Where Z
-lies along X of the frame (ry = +-90), rx is free too: there it is held, so that the flange does not turn for nothing.
+All robots share one rule, so that a path turns the flange alike on each: R = Rx(rx) Ry(ry) Rz(rz), which is how VAL3
+writes it. The tool's Z axis is (sin ry, -sin rx cos ry, cos rx cos ry): it fixes rx and ry, and leaves rz as free spin.
+Where Z lies along X of the frame (ry = +-90), rx is free too: there it is held, so that the flange does not turn for
+nothing.
 """
 
 from __future__ import annotations
@@ -12,16 +14,20 @@ import numpy as np
 
 from sicp_cam.model import FloatArray
 from sicp_cam.rigid_motion import from_parts
-from sicp_postprocessors.rotary import head_angles
 
 __all__ = [
+    "Six",
     "angles_from_axes",
+    "axis_errors_deg",
     "euler_angles",
     "flange_turns_deg",
     "pose_from_six",
     "rotation_matrices",
     "six_from_pose",
 ]
+
+Six = tuple[float, float, float, float, float, float]
+"""A pose as x, y, z in mm and rx, ry, rz in degrees."""
 
 _GIMBAL_CONE_DEG = 1e-4
 
@@ -41,15 +47,13 @@ def angles_from_axes(axes: FloatArray, spin_deg: float, transport: bool) -> Floa
 
     Notes
     -----
-    rx and ry are those of a head that turns about X and tilts about Y, so they follow the path through ry = 90 without
-    a jump of the tool. Results have ry in [-90, 90], rx and rz in (-180, 180].
+    rx and ry follow the path through ry = 90 without a jump of the tool. Results have ry in [-90, 90], rx and rz in
+    (-180, 180].
 
     >>> angles_from_axes(np.array([[0.0, 0.0, -1.0]]), 0.0, False).tolist()
     [[0.0, 0.0, 0.0]]
     """
-    z = -axes
-    head = head_angles(np.column_stack([z[:, 2], -z[:, 1], z[:, 0]]), "BC", _GIMBAL_CONE_DEG)
-    angles = np.column_stack([head.turn_deg, 90.0 - head.tilt_deg, np.full(len(z), spin_deg)])
+    angles = np.column_stack([*_about_x(-axes), np.full(len(axes), spin_deg)])
     if transport:
         angles[:, 2] = _transported_spins(rotation_matrices(angles)) + spin_deg
     return _canonical(angles)
@@ -89,6 +93,41 @@ def flange_turns_deg(angles_deg: FloatArray) -> FloatArray:
     """Return how far the tool turns about its own axis in each move (n,), beyond what its axis demands; first 0."""
     turns: FloatArray = np.abs(np.diff(_transported_spins(rotation_matrices(angles_deg)), prepend=0.0))
     return turns
+
+
+def axis_errors_deg(axes: FloatArray, others: FloatArray) -> FloatArray:
+    """Return the angles between pairs of unit vectors, exact for small angles, which the arc cosine is not."""
+    chords = np.linalg.norm(axes - others, axis=1)
+    errors: FloatArray = np.degrees(2.0 * np.arcsin(np.minimum(chords / 2.0, 1.0)))
+    return errors
+
+
+def _about_x(z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return rx and ry in degrees, unwrapped, that turn Z of a tool into the unit vectors z (n, 3).
+
+    The angle from the X axis and the heading about it have a twin: the other sign, and half a turn further. From one
+    vector to the next the nearer of both is taken; whether that changes sides does not depend on the side.
+    """
+    steep = np.arctan2(np.hypot(z[:, 1], z[:, 2]), z[:, 0])
+    heading = np.arctan2(-z[:, 1], z[:, 2])
+    cone = math.radians(_GIMBAL_CONE_DEG)
+    free = np.flatnonzero((steep > cone) & (steep < math.pi - cone))
+    if not len(free):
+        return np.zeros(len(z)), 90.0 - np.degrees(steep)
+    turned = np.diff(heading[free])
+    same = np.abs(np.diff(steep[free])) + np.abs(_wrapped(turned))
+    other = np.abs(steep[free][1:] + steep[free][:-1]) + np.abs(_wrapped(turned + math.pi))
+    side = np.concatenate([[0], np.cumsum(other < same) % 2])
+    last = np.maximum(np.searchsorted(free, np.arange(len(z)), side="right") - 1, 0)
+    rx = np.unwrap(heading[free] + math.pi * side)[last]
+    # On the X axis rx is held, and the angle from it is the one that comes nearest to z all the same.
+    sideways = -z[:, 1] * np.sin(rx) + z[:, 2] * np.cos(rx)
+    return np.degrees(rx), 90.0 - np.degrees(np.arctan2(sideways, z[:, 0]))
+
+
+def _wrapped(angles: FloatArray) -> FloatArray:
+    """Return angles in radians from -pi to pi."""
+    return np.asarray(np.remainder(angles + math.pi, 2.0 * math.pi) - math.pi)
 
 
 def _transported_spins(R: FloatArray) -> FloatArray:

@@ -23,11 +23,13 @@ _ESCAPES = str.maketrans(
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A global variable: its name, its VAL3 type, and the attributes of each element of its array."""
+    """A global variable: its name, its VAL3 type, and the attributes of each element of its array, or their lines."""
 
     name: str
     type: str
-    values: Sequence[Mapping[str, str]]
+    values: Sequence[Mapping[str, str]] = ()
+    lines: Sequence[str] = ()
+    """The elements as XML already, for arrays that are long."""
 
 
 def project_file(version: str, programs: Iterable[str], data: str) -> bytes:
@@ -69,9 +71,9 @@ def _variable(variable: Variable) -> list[str]:
         "access": "private",
         "xsi:type": "array",
         "type": variable.type,
-        "size": str(len(variable.values)),
+        "size": str(len(variable.values) + len(variable.lines)),
     }
-    values = [
+    values = [*variable.lines] or [
         line for key, value in enumerate(variable.values) for line in _element("Value", {"key": str(key), **value})
     ]
     return _element("Data", attributes, values)

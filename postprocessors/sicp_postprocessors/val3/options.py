@@ -1,0 +1,74 @@
+"""Options of the VAL3 post."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from sicp_cam.ranges import Between
+from sicp_postprocessors.options import THIS_POST, flag
+from sicp_postprocessors.robot_options import RobotOptions
+
+__all__ = ["Val3Options"]
+
+_VERSION = re.compile(r"[A-Za-z0-9_.]{1,40}")
+
+
+@dataclass(frozen=True, slots=True)
+class Val3Options(RobotOptions):
+    r"""Options of the post `val3`. Digital outputs are links such as BasicIO-1\%Q0."""
+
+    version: str = "s7.10.2"
+    """Version that the project file states."""
+    world_origin: Literal["shoulder", "base_plate"] = "shoulder"
+    """Where `cell` is measured from. VAL3's own world lies at the shoulder, axes 1 and 2."""
+    shoulder_height_mm: Annotated[float, Between(0.0, 10_000.0)] = 0.0
+    """Height of the shoulder above the base plate, for `base_plate`: 375 for a TX2-60, 478 for a TX2-90."""
+    shoulder: Literal["ssame", "lefty", "righty", "sfree"] = "ssame"
+    """Side of the shoulder at the first point, which is reached joint by joint; later points keep it."""
+    elbow: Literal["esame", "epositive", "enegative", "efree"] = "esame"
+    """Way that the elbow bends at the first point; later points keep it."""
+    wrist: Literal["wsame", "wpositive", "wnegative", "wfree"] = "wsame"
+    """Way that the wrist bends at the first point; later points keep it."""
+    rotation_deg_s: Annotated[float, Between(0.1, 99_999.0)] = 9999.0
+    """Limit of the tool's turning in every move; a move that reaches it is slower than its feed."""
+    accel_percent: Annotated[float, Between(1.0, 500.0)] = 100.0
+    """Acceleration and deceleration of every move, of the robot's nominal value."""
+    spindle_speed: Literal["none", "num", "aio"] = "none"
+    """Leave the speed to the spindle drive, or write it to a number nSpindle, or to an analog output aoSpindle."""
+    spindle_speed_output: str = ""
+    """Analog output of the spindle speed, for `spindle_speed` = aio."""
+    spindle_speed_scale: Annotated[float | None, Between(1e-6, 1e3)] = None
+    """Value for one rev/min, such as 0.0005 for 10 V at 20000 rev/min; must be given for aio, and is 1 for num."""
+    continue_input: str = ""
+    """Digital input that ends a stop or tool change; without it the operator sets the variable bContinue to true."""
+    log_messages: bool = False
+    """Write stops and tool changes to the controller's log."""
+    decimals: Annotated[int, Between(4, 9)] = 4
+    """Decimals of positions, which are in mm."""
+    angle_decimals: Annotated[int, Between(4, 9)] = 5
+    """Decimals of angles in degrees."""
+    max_points_per_array: Annotated[int, Between(1, 1_000_000)] = 2000
+    """Longer paths get several arrays; what a controller takes depends on its memory."""
+
+    def problems(self) -> list[str]:
+        """Return what does not go together, one line each."""
+        problems = RobotOptions.problems(self)
+        if not _VERSION.fullmatch(self.version):
+            problems.append("option 'version' must look like s7.10.2")
+        if (self.world_origin == "base_plate") != (self.shoulder_height_mm > 0):
+            problems.append("options 'world_origin' = base_plate and 'shoulder_height_mm' belong together; give both")
+        if (self.spindle_speed == "aio") != bool(self.spindle_speed_output):
+            problems.append("options 'spindle_speed' = aio and 'spindle_speed_output' belong together; give both")
+        if self.spindle_speed == "aio" and self.spindle_speed_scale is None:
+            problems.append(
+                "option 'spindle_speed' = aio writes to an analog output, and needs its value for one rev/min; "
+                f"give {flag(THIS_POST, 'spindle_speed_scale', '0.0005')} for 10 V at 20000 rev/min"
+            )
+        return problems
+
+    @property
+    def speed_scale(self) -> float:
+        """Value for one rev/min: 1 where none is given."""
+        return 1.0 if self.spindle_speed_scale is None else self.spindle_speed_scale
