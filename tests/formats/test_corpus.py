@@ -48,7 +48,7 @@ SEEDS = [
     and (file.suffix not in PARTS_OF_A_PROGRAM or kind(file) == "ascii")
 ]
 QUICK = [seed for seed in SEEDS if kind(seed) not in IN_A_CHILD]
-ALONE = [seed for seed in QUICK if kind(seed) not in ("val3", "krl") and seed.suffix != ".gz"]
+ALONE = [seed for seed in QUICK if kind(seed) not in ("val3", "krl", "fanuc_ls") and seed.suffix != ".gz"]
 
 
 def role(seed):
@@ -121,7 +121,7 @@ def test_a_damaged_seed_gives_data_or_an_error_that_names_the_file(seed, tmp_pat
 def test_a_program_that_can_be_written_again_is_the_same_byte_for_byte(seed):
     path = read(seed, seed)
     if path.original is None:
-        assert kind(seed) in ("dxf", "krl", "nci", "rapid", "val3")
+        assert kind(seed) in ("dxf", "fanuc_ls", "krl", "nci", "rapid", "urscript", "val3")
         return
     written = path.original.rewritten(path, np.arange(len(path)))
     assert written.content == seed.read_bytes()

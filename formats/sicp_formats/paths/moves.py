@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -175,6 +175,13 @@ class MoveList:
                 raise self.error("the tool axis turns round by 180 degrees along the arc; split the arc", line)
             self.rows.extend((*tip, *axis, feed, rapid, line))
         self.note(Notice.ARC_FLATTENED, line, sense)
+
+    def forget_lines(self) -> None:
+        """Take all lines as not known: a line means nothing without its file, and a path has room for one file."""
+        self.rows[_COLUMNS - 1 :: _COLUMNS] = array("d", bytes(8 * len(self)))
+        self.events[:] = [replace(event, line=0) for event in self.events]
+        for noted in self.tally.noted.values():
+            noted.line = 0
 
     def build(
         self,
