@@ -68,9 +68,10 @@ def _cell_findings(path: ToolPath, options: RobotOptions, post: str) -> list[Fin
         )
         findings.append(Finding(630, Level.WARN, message))
     if options.cell is None:
+        world = "base plate" if getattr(options, "world_origin", "") == "base_plate" else "world"
         message = (
-            "no cell is given, so the scan frame is taken as the robot's world; give its pose there in mm and degrees "
-            f"with {flag(post, 'cell', _SIX)}"
+            f"no cell is given, so the scan frame is taken as the robot's {world}; give its pose there in mm and "
+            f"degrees with {flag(post, 'cell', _SIX)}"
         )
         findings.append(Finding(631, Level.WARN, message))
     links = {EventKind.SPINDLE: options.spindle_output, EventKind.COOLANT: options.coolant_output}
@@ -93,7 +94,8 @@ def _spindle_findings(path: ToolPath, options: RobotOptions, post: str) -> list[
         findings += [Finding(633, Level.FAIL, message, event_place(e)) for e in starts if e.value < 0]
     if starts and getattr(options, "spindle_speed", "none") == "none":
         speeds = ", ".join(f"{abs(speed):g}" for speed in dict.fromkeys(event.value for event in starts))
-        message = f"the spindle speed is not commanded: set {speeds} rev/min at the drive"
+        words = f", or {flag(post, 'spindle_speed', 'num')} (or aio)" if hasattr(options, "spindle_speed") else ""
+        message = f"the spindle speed is not commanded: set {speeds} rev/min at the drive{words}"
         findings.append(Finding(634, Level.INFO, message))
     message = "cuts with the spindle off after a tool change; start the spindle in the path after the change"
     findings += [Finding(637, Level.FAIL, message, event_place(e)) for e in _changes_without_restart(path)]

@@ -55,8 +55,12 @@ class Val3(RobotPostprocessor):
     # --- words ---
 
     def comment(self, text: str) -> str:
-        """Return a comment without the mark that ends an XML character section."""
-        return f"// {text.replace(']]>', ']] >')}"
+        """Return a comment."""
+        return f"// {text}"
+
+    def comments(self, text: str) -> list[str]:
+        """Return text as comments, without the mark that ends an XML character section."""
+        return RobotPostprocessor.comments(self, text.replace("]]>", "]] >"))
 
     def wait(self) -> Iterator[str]:
         """Return the wait for the arm."""
