@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from sicp_cam.errors import JobError, OutputError, PathError
 from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind
-from sicp_postprocessors.val3 import Val3, application_name
 from sicp_postprocessors.moves import divided_at_retracts
 from sicp_postprocessors.orientations import (
     angles_from_axes,
@@ -19,6 +18,7 @@ from sicp_postprocessors.orientations import (
     rotation_matrices,
     six_from_pose,
 )
+from sicp_postprocessors.val3 import Val3, application_name
 from sicp_postprocessors.val3.xml import Variable, data_file, program_file
 
 MOVES = ("movej", "movel")
