@@ -91,6 +91,7 @@ def test_a_job_file_can_say_everything(folder, monkeypatch):
         decimal = ","
         [options.post.val3]
         spin_deg = 90.0
+        robot = "cells/our.toml"
         """,
     )
     monkeypatch.chdir("/")
@@ -103,7 +104,7 @@ def test_a_job_file_can_say_everything(folder, monkeypatch):
     assert isinstance(job.registration.reach_mm, float)
     assert (job.toolpath.feed_mm_min, job.gates.coverage, job.limits.points) == (1500.0, 0.75, 10)
     assert job.scan_options == {"decimal": ","}
-    assert job.post_options == {"val3": {"spin_deg": 90.0}}
+    assert job.post_options == {"val3": {"spin_deg": 90.0, "robot": str(folder / "cells/our.toml")}}
 
 
 def test_the_command_line_beats_the_environment_and_that_the_job_file(folder):

@@ -17,7 +17,8 @@ A job file holds the keys of `Job` and its tables::
     [options.post.val3]     # what the post takes
     spin_deg = 90.0
 
-It holds values only: nothing in it is run.
+It holds values only: nothing in it is run. File names are relative to its folder, also those of data files (.toml) that
+options of a post name.
 """
 
 from __future__ import annotations
@@ -130,6 +131,7 @@ _KEYS = tuple(f.name for f in fields(Job) if f.name not in TABLES and not f.name
 _REQUIRED = tuple(f.name for f in fields(Job) if f.default is MISSING and f.default_factory is MISSING)
 _LISTS = ("post", "report", "override", "contour")
 _NAME_LENGTH = 120
+_DATA_FILE = ".toml"
 _ROLES = {"part": "cad", "scan": "scan", "path": "path"}
 _NO_REPORT = "; or none for no report"
 _CONTOUR = "must be auto or numbers of contours from 1, such as 1,2; see sicp-cam inspect"
@@ -260,6 +262,12 @@ def _wrong_places(values: Mapping[str, Any], stated: Mapping[str, _Stated]) -> d
     return {_ROLES[role]: problem for role, problem in wrong_places(files).items()}
 
 
+def _beside_the_job(value: object, folder: Path) -> object:
+    """Return a data file that an option names (a machine, a robot) as a path from here; any other value as it is."""
+    is_file = isinstance(value, str) and value.strip().lower().endswith(_DATA_FILE)
+    return str(folder / str(value).strip()) if is_file else value
+
+
 def _post_options(
     stated: Mapping[str, _Stated], posts: tuple[str, ...] | None
 ) -> tuple[Mapping[str, Options], dict[str, str]]:
@@ -277,5 +285,5 @@ def _post_options(
             # Options of a post that a later layer has left out do no harm.
             problems[whole] = f"{printable(post, 60)} is not among the posts of this job; {nearest(post, posts)}"
         elif option and post in posts:
-            options.setdefault(post, {})[option] = value
+            options.setdefault(post, {})[option] = _beside_the_job(value, stated[whole].layer.folder)
     return MappingProxyType({post: MappingProxyType(table) for post, table in options.items()}), problems
