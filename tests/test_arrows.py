@@ -135,7 +135,7 @@ def test_every_entry_point_can_be_imported_without_cad_kernel_and_renderer():
     assert not loaded_after(script) & {"OCP", "cadquery", "vtk", "vtkmodules", "pyvista", "matplotlib"}
 
 
-@pytest.mark.parametrize("group", ["sicp_cam.formats", "sicp_cam.postprocessors"])
+@pytest.mark.parametrize("group", [group for group in ENTRY_POINTS if group.startswith("sicp_cam.")])
 def test_the_installed_entry_points_are_those_of_the_project_file(group):
     from importlib.metadata import entry_points
 

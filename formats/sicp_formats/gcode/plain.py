@@ -10,7 +10,7 @@ from sicp_formats.gcode.motion import Motion
 from sicp_formats.gcode.words import Word
 from sicp_formats.paths.moves import MoveList
 
-__all__ = ["PlainMoves", "plain_words"]
+__all__ = ["PLAIN", "PlainMoves", "plain_words"]
 
 _VALUE = r"[ \t]*+([+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++))[ \t]*+"
 
@@ -19,13 +19,15 @@ def _word(letter: str) -> str:
     return f"(?:{letter}{_VALUE})?"
 
 
-_PLAIN = re.compile(
+PLAIN = re.compile(
     r"[ \t]*+(?:N[ \t]*+([0-9]{1,12}+)[ \t]*+)?(?:G0?([01])(?![0-9.])[ \t]*+)?"
     + _word("X=?") + _word("Y=?") + _word("Z=?")
     + _word("A3=") + _word("B3=") + _word("C3=") + _word("I") + _word("J") + _word("K")
     + _word("A=?") + _word("B=?") + _word("C=?") + _word("F=?"),
     re.ASCII,
 ).fullmatch  # fmt: skip
+"""Matches a plain block; its groups are the numbers of N, G, X, Y, Z, A3, B3, C3, I, J, K, A, B, C and F."""
+
 _LETTERS = ("N", "G", "X", "Y", "Z", "A3", "B3", "C3", "I", "J", "K", "A", "B", "C", "F")
 _BLOCK_NUMBER_WRAP = 9000
 
@@ -36,7 +38,7 @@ def plain_words(text: str) -> list[Word] | None:
     >>> [(word.letter, word.number, word.start, word.end) for word in plain_words("X1. A3=.5") or ()]
     [('X', '1.', 0, 3), ('A3', '.5', 4, 9)]
     """
-    found = _PLAIN(text)
+    found = PLAIN(text)
     if found is None:
         return None
     words, place = [], 0
@@ -69,7 +71,7 @@ class PlainMoves:
 
     def execute(self, text: str, line: int) -> bool:
         """Execute a block; return False, with nothing changed, if it is not a plain move."""
-        found = _PLAIN(text)
+        found = PLAIN(text)
         if found is None or not self.usable:
             return False
         n, g, x, y, z, i3, j3, k3, i, j, k, a, b, c, f = found.groups()

@@ -1,0 +1,63 @@
+"""What checkers find in the text of a program: one finding for each place, until there are too many of a kind."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sicp_cam.errors import printable
+from sicp_cam.findings import Finding, Level
+
+__all__ = ["Defects"]
+
+_MOST = 5
+_NUMBER = re.compile(r"[0-9.]+")
+
+
+@dataclass(slots=True)
+class Defects:
+    """The defects of one file.
+
+    >>> defects = Defects(Path("a.nc"))
+    >>> defects.fail(875, "F0: a cut without feed", 3)
+    >>> defects.findings()[0].where
+    'a.nc, line 3'
+    """
+
+    path: Path
+    _found: list[Finding] = field(default_factory=list)
+    _counts: dict[tuple[int, str], int] = field(default_factory=dict)
+    _last: dict[tuple[int, str], int] = field(default_factory=dict)
+
+    def fail(self, code: int, message: str, line: int = 0) -> None:
+        """Note what forbids to run the program."""
+        self._note(code, Level.FAIL, message, line)
+
+    def warn(self, code: int, message: str, line: int = 0) -> None:
+        """Note what somebody should look at."""
+        self._note(code, Level.WARN, message, line)
+
+    def info(self, code: int, message: str, line: int = 0) -> None:
+        """Note what is worth knowing."""
+        self._note(code, Level.INFO, message, line)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return all of them by code and place; the last one told of a kind says how many more there are."""
+        found = list(self._found)
+        for key, at in self._last.items():
+            more = self._counts[key] - _MOST
+            if more > 0:
+                one = found[at]
+                found[at] = Finding(one.code, one.level, f"{one.message} (and {more} more like this)", one.where)
+        return tuple(sorted(found, key=lambda finding: finding.code))
+
+    def _note(self, code: int, level: Level, message: str, line: int) -> None:
+        """Keep a defect; those whose texts differ in numbers only are of one kind."""
+        kind = (code, _NUMBER.sub("0", message))
+        self._counts[kind] = self._counts.get(kind, 0) + 1
+        if self._counts[kind] > _MOST:
+            return
+        self._last[kind] = len(self._found)
+        name = printable(str(self.path))
+        self._found.append(Finding(code, level, printable(message, 300), f"{name}, line {line}" if line else name))

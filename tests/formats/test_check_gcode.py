@@ -1,0 +1,193 @@
+"""Each defect of a G-code program, put into a good one, is told with its code and its line."""
+
+import time
+
+import pytest
+
+from sicp_cam.errors import JobError
+from sicp_cam.findings import Level
+from sicp_cam.plugins.checkers import check_program
+from sicp_formats.gcode import read_path
+from sicp_formats.gcode.check import check
+
+VECTOR = """%
+(porthole)
+N10 G21 G90 G94 G17 G40
+N20 T3 M6
+N30 G43.5 H3
+N40 S12000 M3
+N50 G0 X100. Y0. Z50. I0.1 J0. K0.995
+N60 G1 X100. Y0. Z5. I0.1 J0. K0.995 F2000
+N70 G1 X98. Y20. Z5. I0.1 J0.05 K0.99
+N80 G0 X98. Y20. Z50. I0.1 J0.05 K0.99
+N90 M5
+N100 G49
+N110 M30
+%
+"""
+ROTARY = """G21 G90 G94 G17
+G49
+G43.4 H1
+G0 X0. Y0. Z50. A10. C170.
+G1 Z0. F1000
+G1 X10. Y0. A10. C175.
+G1 X20. Y5. A11. C185.
+G0 Z50.
+G49
+M30
+"""
+ARCS = """G21 G90 G17
+G0 X0 Y0 Z5
+G1 Z0 F500
+G2 X10 Y0 I5 J0
+G3 X10 Y10 R5
+G2 X10 Y10 I5
+G18 G2 X20 Z0 I5 K0
+G1 X20 Y20
+M2
+"""
+INVERSE = """G21 G90 G17 G93
+G0 X0 Y0 Z5
+G1 X10 F60
+G1 X20 F30
+M30
+"""
+HEIDENHAIN = """%PART G71 *
+N10 G30 G17 X+0 Y+0 Z-20*
+N20 G00 G90 X+0 Y+0 Z+50*
+N30 G01 Z-1 F500*
+N40 X+20 Y+5*
+N50 G00 Z+50 M2*
+N99999 %PART G71 *
+"""
+SIEMENS = """%_N_PART_MPF
+G710 G90 G94 G17 G40
+TRAFOOF
+T="MILL" M6
+TRAORI
+MSG("hello")
+S1000 M3
+G0 X0 Y0 Z50 A3=0 B3=0 C3=1
+G1 X0 Y0 Z0 A3=0 B3=0.1 C3=0.99 F800
+G1 X=IC(5) Y3
+M5
+TRAFOOF
+M30
+"""
+GOOD = {
+    "vector": VECTOR,
+    "rotary": ROTARY,
+    "arcs": ARCS,
+    "inverse": INVERSE,
+    "siemens": SIEMENS,
+    "heidenhain": HEIDENHAIN,
+}
+BROKEN = [
+    # program, old, new, code, level, line, words
+    ("vector", "%\n(porthole)", "(porthole)", 870, "warn", 13, "without its counterpart at the beginning"),
+    ("vector", "M30\n%", "M30", 870, "warn", 1, "without its counterpart at the end"),
+    ("vector", "M30\n%", "M30\n%\n%", 870, "fail", 15, "a third %"),
+    ("vector", "%\n(porthole)", "(head)\n%\n(porthole)", 870, "warn", 1, "text before the first %"),
+    ("vector", "(porthole)", "(p\u00f6rthole)", 870, "warn", 2, "no ASCII character"),
+    ("vector", "(porthole)", f"({'p' * 300})", 870, "fail", 2, "302 characters, more than 255"),
+    ("vector", "N110 M30\n%", "%", 871, "warn", 14, "no end"),
+    ("vector", "G21 G90", "G90", 872, "warn", 7, "units"),
+    ("vector", "G21 G90", "G21", 872, "warn", 7, "absolute coordinates"),
+    ("arcs", "G21 G90 G17", "G21 G90", 872, "warn", 4, "arc before its plane"),
+    ("arcs", "G0 X0 Y0 Z5", "X0 Y0 Z5", 872, "fail", 2, "without a motion word"),
+    ("vector", "N70 ", "N60 ", 873, "warn", 9, "N60 stands twice"),
+    ("vector", "N70 ", "N55 ", 873, "warn", 9, "N55 comes after N60"),
+    ("vector", "G94 G17", "G93 G94 G17", 874, "fail", 3, "G93, G94 in one block"),
+    ("vector", "M5\n", "M5 M3\n", 874, "fail", 11, "M5, M3 in one block"),
+    ("vector", "M5\n", "M5 M5\n", 874, "fail", 11, "M5"),
+    ("vector", "G40", "G321", 874, "fail", 3, "unknown g code used: G321"),
+    ("vector", "X98. Y20. Z5.", "X98. X20. Z5.", 874, "fail", 9, "multiple X words"),
+    ("vector", "X98. Y20. Z5.", "X98. Y#1 Z5.", 874, "fail", 9, "variables"),
+    ("vector", "(porthole)", "(porthole", 874, "fail", 2, "unclosed comment"),
+    ("vector", " F2000", "", 875, "fail", 8, "before a feed"),
+    ("vector", "F2000", "F0", 875, "fail", 8, "must be more than 0"),
+    ("inverse", "X20 F30", "X20", 875, "fail", 4, "inverse time (G93) without F"),
+    ("inverse", "G1 X10 F60", "G1 G94 X10", 875, "fail", 3, "before a feed"),
+    ("vector", "N30 G43.5 H3\n", "", 876, "fail", 6, "no word switches tip control on"),
+    ("vector", "G43.5", "G43.4", 876, "fail", 7, "G43.5 is not on"),
+    ("vector", "N100 G49\n", "", 876, "warn", 12, "ends while tip control is on"),
+    ("vector", "N90 M5", "N90 T4 M6", 876, "warn", 11, "tool is changed while tip control is on"),
+    ("vector", "N80 G0", "N75 G49\nN80 G0", 876, "fail", 11, "after tip control is switched off"),
+    ("vector", "N30 G43.5 H3\n", "", 876, "fail", 6, "as a vector"),
+    ("siemens", "TRAORI\n", "", 876, "fail", 7, "no word switches tip control on"),
+    ("rotary", "G0 Z50.\nG49", "G49\nG1 C200.\nG0 Z50.", 876, "fail", 9, "C turns in a cut after tip control"),
+    ("rotary", "G43.4 H1\nG0", "G0 A0. C0.\nG1 X1. A5. F100\nG43.4 H1\nG0", 876, "fail", 4, "before tip control"),
+    ("rotary", "C185.", "C-175.", 877, "warn", 7, "C turns by 350 degrees in one block, from 175 to -175"),
+    ("arcs", "X10 Y0 I5 J0", "X10 Y0 I5.5 J0", 878, "fail", 4, "begins 5.5 and ends 4.5"),
+    ("arcs", "X10 Y10 R5", "X10 Y10 R4", 878, "fail", 5, "R4 makes no arc"),
+    ("arcs", "X10 Y10 R5", "X10 Y10", 878, "fail", 5, "neither R nor I J"),
+    ("arcs", "I5 K0", "I7 K0", 878, "fail", 7, "begins 7 and ends 3"),
+    ("vector", "(porthole)", "(MSG, porthole)", 879, "warn", 2, "MSG is executed"),
+    ("vector", "(porthole)", "(logopen,x.txt)", 879, "warn", 2, "LOGOPEN is executed"),
+    ("vector", "(porthole)", ";py,stop()", 879, "warn", 2, "PY is executed"),
+]
+
+
+def findings_of(tmp_path, text, **options):
+    file = tmp_path / "a.nc"
+    file.write_text(text, encoding="utf-8")
+    return check(file, **options)
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_a_good_program_has_no_findings_and_can_be_read(tmp_path, name):
+    assert findings_of(tmp_path, GOOD[name]) == ()
+    read_path(tmp_path / "a.nc", rotary="AC" if name == "rotary" else None)
+
+
+@pytest.mark.parametrize(("name", "old", "new", "code", "level", "line", "words"), BROKEN)
+def test_a_defect_is_told_with_its_code_and_line(tmp_path, name, old, new, code, level, line, words):
+    assert GOOD[name].count(old) == 1
+    found = findings_of(tmp_path, GOOD[name].replace(old, new))
+    told = next((f.code, f.level.value, f.where) for f in found if words in f.message)
+    assert told == (code, level, f"{tmp_path / 'a.nc'}, line {line}")
+    assert {f.code for f in found} == {code}
+
+
+def test_inches_and_incremental_moves_are_followed(tmp_path):
+    text = "G20 G91 G17\nG0 X0 Y0 Z0\nG1 X1 F10\nG2 X1 Y0 I.5 J0\nG2 X1 Y0 I.5001 J0\nG2 X1 Y0 I.501 J0\nM2\n"
+    text = text.replace("G0 X0 Y0 Z0", "G90 G0 X0 Y0 Z0\nG91")
+    assert [f.where[-6:] for f in findings_of(tmp_path, text)] == ["line 7"]
+
+
+def test_machine_positions_are_no_part_of_the_path(tmp_path):
+    text = ROTARY.replace("G0 Z50.\n", "G0 Z50.\nG53 G0 Z0. C0.\nG28 A0. C720.\nG0 A0. C-170.\n")
+    assert findings_of(tmp_path, text) == ()
+
+
+def test_a_pole_may_turn_as_far_as_the_option_says(tmp_path):
+    text = ROTARY.replace("C185.", "C-175.")
+    assert findings_of(tmp_path, text, rotary_step_deg=360.0) == ()
+    assert [f.code for f in findings_of(tmp_path, ROTARY, rotary_step_deg=4.0)] == [877, 877]
+    assert [f.code for f in findings_of(tmp_path, VECTOR, line_length=30)] == [870] * 4
+
+
+def test_defects_of_one_kind_are_counted_after_the_fifth(tmp_path):
+    text = INVERSE.replace("G1 X20 F30\n", "".join(f"G1 X{20 + i}\n" for i in range(12)))
+    found = findings_of(tmp_path, text)
+    assert [f.where.rpartition(" ")[2] for f in found] == ["4", "5", "6", "7", "8"]
+    assert found[-1].message.endswith("(and 7 more like this)") and "more" not in found[0].message
+
+
+def test_options_have_types_and_near_names(tmp_path):
+    file = tmp_path / "a.nc"
+    file.write_text(VECTOR, encoding="ascii")
+    with pytest.raises(JobError, match=r"check\.line_lenght: unknown option; did you mean line_length"):
+        check_program(check, file, options={"line_lenght": 3})
+    with pytest.raises(JobError, match=r"check\.line_length: must be a whole number"):
+        check_program(check, file, options={"line_length": "x"})
+    assert [f.level for f in check_program(check, file, options={"line_length": 40})] == [Level.FAIL]
+
+
+def test_long_programs_are_checked_in_seconds(tmp_path):
+    rows = "".join(f"N{i} G1 X{i}.5 Y{i % 7} Z5.1234 I0.1 J0.05 K0.99\n" for i in range(71, 100_000))
+    file = tmp_path / "a.nc"
+    file.write_text(VECTOR.replace("N80 ", f"{rows}N100000 ").replace("N90 ", "").replace("N100 ", ""))
+    start = time.perf_counter()
+    assert check(file) == ()
+    assert time.perf_counter() - start < 5.0
