@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sicp_cam.model import FloatArray
 from sicp_cam.rigid_motion import from_parts
@@ -20,9 +21,12 @@ __all__ = [
     "angles_from_axes",
     "axis_errors_deg",
     "euler_angles",
+    "euler_zyx",
     "flange_turns_deg",
     "pose_from_six",
+    "quaternions",
     "rotation_matrices",
+    "rotation_vectors",
     "six_from_pose",
 ]
 
@@ -30,6 +34,8 @@ Six = tuple[float, float, float, float, float, float]
 """A pose as x, y, z in mm and rx, ry, rz in degrees."""
 
 _GIMBAL_CONE_DEG = 1e-4
+_GIMBAL_COSINE = 1e-7
+_NO_TURN = 1e-12
 
 
 def angles_from_axes(axes: FloatArray, spin_deg: float, transport: bool) -> FloatArray:
@@ -77,6 +83,55 @@ def euler_angles(R: FloatArray) -> tuple[float, float, float]:
         return 0.0, math.degrees(ry), math.degrees(math.atan2(R[1, 0], R[1, 1]))
     rx, rz = math.atan2(-R[1, 2], R[2, 2]), math.atan2(-R[0, 1], R[0, 0])
     return math.degrees(rx), math.degrees(ry), math.degrees(rz)
+
+
+def euler_zyx(R: FloatArray) -> FloatArray:
+    """Return a, b, c (n, 3) in degrees of rotations (n, 3, 3) with R = Rz(a) Ry(b) Rx(c): KUKA's A B C, Fanuc's R P W.
+
+    Where b is +-90 only a - c or a + c is fixed: there a stays what it was in the row before, 0 at first.
+
+    >>> R = rotation_matrices(np.array([[0.0, 90.0, 0.0], [180.0, 0.0, 0.0]]))
+    >>> (euler_zyx(R).round(6) + 0.0).tolist()
+    [[0.0, 90.0, 0.0], [0.0, 0.0, 180.0]]
+    """
+    free = np.hypot(R[:, 0, 0], R[:, 1, 0]) > _GIMBAL_COSINE
+    last = np.maximum.accumulate(np.where(free, np.arange(len(R)), -1))
+    a = np.where(last >= 0, np.arctan2(R[last, 1, 0], R[last, 0, 0]), 0.0)
+    # With a given, Rz(-a) R = Ry(b) Rx(c) tells b and c everywhere, and exactly where a was free to choose.
+    cos_a, sin_a = np.cos(a), np.sin(a)
+    b = np.arctan2(-R[:, 2, 0], cos_a * R[:, 0, 0] + sin_a * R[:, 1, 0])
+    c = np.arctan2(sin_a * R[:, 0, 2] - cos_a * R[:, 1, 2], cos_a * R[:, 1, 1] - sin_a * R[:, 0, 1])
+    return np.asarray(np.degrees(np.column_stack([a, b, c])))
+
+
+def quaternions(R: FloatArray) -> FloatArray:
+    """Return unit quaternions (n, 4), scalar first, of rotations (n, 3, 3): the first with its scalar from 0 on.
+
+    Each later one has the sign that brings it nearer to the one before.
+
+    >>> quaternions(rotation_matrices(np.array([[180.0, 0.0, 0.0]]))).round(6).tolist()
+    [[0.0, 1.0, 0.0, 0.0]]
+    """
+    q = np.roll(Rotation.from_matrix(R).as_quat(), 1, axis=1)
+    signs = np.ones(len(q))
+    signs[:1] = np.where(q[:1, 0] < 0.0, -1.0, 1.0)
+    signs[1:] = np.where(np.einsum("ni,ni->n", q[:-1], q[1:]) < 0.0, -1.0, 1.0)
+    # +0.0: a product with -1 would leave zeros with a sign.
+    continuous: FloatArray = q * np.cumprod(signs)[:, None] + 0.0
+    return continuous
+
+
+def rotation_vectors(R: FloatArray) -> FloatArray:
+    """Return rotation vectors (n, 3) in radians of rotations (n, 3, 3), without a jump where the angle passes pi.
+
+    >>> rotation_vectors(rotation_matrices(np.array([[180.0, 0.0, 0.0]]))).round(6).tolist()
+    [[3.141593, 0.0, 0.0]]
+    """
+    q = quaternions(R)
+    sine = np.linalg.norm(q[:, 1:], axis=1)
+    angle = 2.0 * np.arctan2(sine, q[:, 0])
+    vectors: FloatArray = np.where(sine > _NO_TURN, angle / np.maximum(sine, _NO_TURN), 0.0)[:, None] * q[:, 1:]
+    return vectors
 
 
 def pose_from_six(six: tuple[float, ...]) -> FloatArray:

@@ -140,14 +140,18 @@ class RobotPostprocessor(LinePostprocessor):
         """Return the rotations (n, 3, 3) of the tool of every move in the program frame."""
         return rotation_matrices(self.angles_deg(path))
 
+    def pose_of_six(self, six: Six) -> FloatArray:
+        """Return the pose (4, 4) that six numbers of an option mean."""
+        return pose_from_six(six)
+
     def pose_in_world(self, program: Program) -> FloatArray:
         """Return the pose (4, 4) of the program frame in the robot's world: the cell, and the scan frame within it."""
-        pose: FloatArray = pose_from_six(self.options.cell or ZERO) @ program.T_scan_program
+        pose: FloatArray = self.pose_of_six(self.options.cell or ZERO) @ program.T_scan_program
         return pose
 
     def tool_in_flange(self) -> FloatArray:
         """Return the pose (4, 4) of the tool in the flange."""
-        return pose_from_six(self.options.tool or ZERO)
+        return self.pose_of_six(self.options.tool or ZERO)
 
     def events(self, program: Program) -> list[Event]:
         """Return the events with what a tool change by hand needs: the spindle off before it, a stop behind it."""
@@ -201,7 +205,7 @@ class RobotPostprocessor(LinePostprocessor):
 
     def frame_remark(self, program: Program, named: str = "the program frame") -> str:
         """Return what the program's frame is the pose of: the scan frame, or the part in it."""
-        if self.options.cell is None:
+        if not self.options.cell_is_known:
             pose = f"the {frame_name(program)} frame" if in_scan_frame(program) else "the part in the scan frame"
             taken = f"the {'scan' if program.corrected else 'path'} frame"
             return f"{named} is the pose of {pose}; no cell is given, so {taken} is taken as the robot's world"

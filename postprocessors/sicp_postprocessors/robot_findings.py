@@ -61,13 +61,13 @@ def changes_tool_by_hand(event: Event) -> bool:
 def _cell_findings(path: ToolPath, options: RobotOptions, post: str) -> list[Finding]:
     """Tell what the program declares without knowing it: the tool, the place of the scan frame, the outputs."""
     findings = []
-    if options.tool is None:
+    if not options.tool_is_known:
         message = (
             "the tool is declared at the flange itself; give its tip in mm and degrees with "
             f"{flag(post, 'tool', _SIX)}, or teach it on the controller"
         )
         findings.append(Finding(630, Level.WARN, message))
-    if options.cell is None:
+    if not options.cell_is_known:
         world = "base plate" if getattr(options, "world_origin", "") == "base_plate" else "world"
         message = (
             f"no cell is given, so the scan frame is taken as the robot's {world}; give its pose there in mm and "

@@ -65,6 +65,16 @@ class RobotOptions:
         return output_words(self.outputs)[1]
 
     @property
+    def tool_is_known(self) -> bool:
+        """Whether the user says what the tool is; a controller may have it in its own memory."""
+        return self.tool is not None
+
+    @property
+    def cell_is_known(self) -> bool:
+        """Whether the user says where the scan frame is; a controller may have it in its own memory."""
+        return self.cell is not None
+
+    @property
     def blends(self) -> bool:
         """Whether points between cutting moves are rounded."""
         return self.blend and not self.first_run
