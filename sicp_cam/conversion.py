@@ -18,10 +18,11 @@ import numpy as np
 
 from sicp_cam import output, plugins
 from sicp_cam.correction import unit_taken
-from sicp_cam.errors import InputError, JobError, OutputError, SicpError, printable
+from sicp_cam.errors import JobError, OutputError, SicpError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import FloatArray, IntArray, Part, Program, Scan, Source, Status, ToolPath
+from sicp_cam.reading_back import read_back
 from sicp_cam.result_document import SCHEMA, findings_list, input_entry, output_entry, status, versions
 from sicp_cam.roles import role_of
 from sicp_cam.units import mm_per_unit
@@ -29,9 +30,6 @@ from sicp_cam.units import mm_per_unit
 __all__ = ["Conversion", "convert"]
 
 Options = Mapping[str, object]
-
-_FAR_MM, _TURNED = 0.002, 1e-4
-"""What rounding to the decimals of a program may move a tip by, and a component of an axis."""
 
 
 def _none() -> Options:
@@ -252,15 +250,11 @@ def _program(
     )
     files: dict[str, bytes] = post.write(program)
     findings = tuple(post.preflight(program))
-    if len(files) != 1 or not job.target.suffix:
-        return files, (*findings, _not_read_back(job, "it is a folder of files")), None
-    (content,) = files.values()
-    read_back, found = _path_read_back(job, path, content)
-    return {job.target.name: content}, findings + found, read_back
-
-
-def _not_read_back(job: Conversion, why: str) -> Finding:
-    return Finding(652, Level.INFO, f"what was written was not read back: {why}", str(job.target))
+    if len(files) == 1 and job.target.suffix:
+        files = {job.target.name: next(iter(files.values()))}
+    told = job.in_options if name == "same" else None
+    back = read_back(post, program, files, options=told, limits=job.limits)
+    return files, findings + back.findings, back.facts
 
 
 def _post(job: Conversion, path: ToolPath) -> str:
@@ -282,37 +276,3 @@ def _notes(path: ToolPath) -> list[str]:
     made = f"sicp-cam {versions()['sicp-cam']}, converted and not corrected to any scan"
     source = path.source
     return [made] if source is None else [made, f"path {Path(source.path).name} sha256 {source.sha256[:16]}"]
-
-
-def _path_read_back(
-    job: Conversion, path: ToolPath, content: bytes
-) -> tuple[dict[str, Any] | None, tuple[Finding, ...]]:
-    """Compare what was written with what was read, where the reader needs nothing more to be told.
-
-    Raises
-    ------
-    OutputError
-        If a move is missing or lies elsewhere.
-    """
-    with tempfile.TemporaryDirectory(prefix="sicp-cam-") as folder:
-        copy = Path(folder) / job.target.name
-        copy.write_bytes(content)
-        options = job.in_options if _same_words(job) else {}
-        try:
-            again = plugins.read_path(copy, limits=job.limits, options=options)
-        except (InputError, JobError) as error:
-            why = str(error).replace(str(copy), printable(str(job.target)))
-            return None, (_not_read_back(job, why),)
-    if len(again) != len(path) or (again.rapid != path.rapid).any():
-        raise OutputError(
-            f"{printable(str(job.target))}: {len(path)} moves were to be written, and {len(again)} or others were read"
-            " back; nothing was written: choose another format"
-        )
-    far = float(np.abs(again.tips_mm - path.tips_mm).max())
-    turned = float(np.abs(again.axes - path.axes).max())
-    if far > _FAR_MM or turned > _TURNED:
-        raise OutputError(
-            f"{printable(str(job.target))}: read back with tips {far:.3g} mm off and axes off by {turned:.3g}; nothing"
-            " was written: ask for more decimals, or choose another format"
-        )
-    return {"count": len(again), "largest_difference_mm": far}, ()

@@ -16,6 +16,7 @@ from sicp_cam.errors import ReportError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
 from sicp_cam.model import FloatArray, Part, Program, Scan, ToolPath
+from sicp_cam.reading_back import read_back
 from sicp_cam.report.statistics import uncertainty_summary
 from sicp_cam.result_document import (
     SCHEMA,
@@ -107,10 +108,12 @@ class Correction:
     def files(
         self, post: str, options: Mapping[str, object] | None = None
     ) -> tuple[dict[str, bytes], tuple[Finding, ...]]:
-        """Return the files that a postprocessor makes of the program, and what it noticed."""
+        """Return the files that a postprocessor makes of the program, read back and compared, and what it noticed."""
         writer = plugins.postprocessor(post, options or {})
         program = self.program
-        return writer.write(program), tuple(writer.preflight(program))
+        files = writer.write(program)
+        back = read_back(writer, program, files, limits=self.job.limits)
+        return files, (*writer.preflight(program), *back.findings)
 
     def write(self, post: str, out: str | Path, *, force: bool = False, **options: object) -> list[Path]:
         """Write the program for one controller into a folder and return the files.

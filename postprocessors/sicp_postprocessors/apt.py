@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -62,6 +62,10 @@ class Apt(LinePostprocessor):
     comment_drop = "$'"
     missing_feed = Level.WARN
     """CL data may leave the feeds to the post that follows, but a feed once stated would rule the moves without one."""
+
+    def reading(self) -> Mapping[str, object]:
+        """Say that the reader needs to be told nothing."""
+        return {}
 
     def preflight(self, program: Program) -> list[Finding]:
         """Return the findings of every post, and of the frame of the coordinates."""

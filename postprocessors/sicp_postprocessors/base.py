@@ -90,6 +90,18 @@ class Postprocessor(ABC):
                 )
         return files
 
+    def main_file(self, files: Mapping[str, bytes]) -> str:
+        """Return the name of the file that the controller opens, and readers too: the only one, or the first."""
+        return next(iter(files))
+
+    def reading(self) -> Mapping[str, object] | str:
+        """Return what the reader of the written programs must be told, or why none can compare them with the path.
+
+        What is written is read back and compared before it is kept, wherever a post says how; tips and axes in the
+        program frame.
+        """
+        return f"post {self.name} does not say how its programs are read"
+
     @abstractmethod
     def files(self, program: Program) -> dict[str, bytes]:
         """Return the files of a program that has passed `preflight`; called by `write` only."""

@@ -62,6 +62,10 @@ class Dxf(Postprocessor):
     missing_feed = Level.INFO
     options: DxfOptions
 
+    def reading(self) -> str:
+        """Say why no path is read back: the lines of a drawing are no moves yet."""
+        return "a drawing holds curves, not moves"
+
     def preflight(self, program: Program) -> list[Finding]:
         """Return the findings of every post, and what a drawing cannot hold."""
         counts = Counter(event.kind for event in program.path.events)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -42,6 +42,13 @@ class GCode(LinePostprocessor):
     options: GCodeOptions
     suffix = ".nc"
     comment_drop = "()%;"
+
+    def reading(self) -> Mapping[str, object] | str:
+        """Say that rotary words mean nothing without the machine; those of vectors speak for themselves."""
+        return "the angles of rotary axes mean nothing without the machine" if self._is_rotary() else {}
+
+    def _is_rotary(self) -> bool:
+        return self.options.orientation == "rotary"
 
     def preflight(self, program: Program) -> list[Finding]:
         """Return the findings of every post, of the frame of the coordinates, and of the rotary axes."""

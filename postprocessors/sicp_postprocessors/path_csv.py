@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -33,6 +34,10 @@ class PathCsv(Postprocessor):
     summary = "table x,y,z,i,j,k,feed,rapid,status and further columns"
     suffix = ".csv"
     missing_feed = Level.WARN
+
+    def reading(self) -> Mapping[str, object]:
+        """Say that the reader needs to be told nothing."""
+        return {}
 
     def preflight(self, program: Program) -> list[Finding]:
         """Return the findings of every post, and what a table cannot hold: events and the program frame."""

@@ -32,6 +32,10 @@ class Same(Postprocessor):
         super().__init__(options)
         self._last: tuple[Program, Rewritten] | None = None
 
+    def reading(self) -> str:
+        """Say nothing: whoever writes the program again has read it back already."""
+        return ""
+
     def preflight(self, program: Program) -> list[Finding]:
         """Return the findings of every post, and those of writing the program again."""
         findings = [*super().preflight(program), *_refusals(program)]

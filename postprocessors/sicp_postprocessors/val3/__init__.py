@@ -6,7 +6,7 @@ The rigid part of a correction can stay in the frame `fPart`, where the operator
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -131,6 +131,14 @@ class Val3(RobotPostprocessor):
         pose = RobotPostprocessor.pose_in_world(self, program)
         pose[2, 3] -= self.options.shoulder_height_mm
         return pose
+
+    def main_file(self, files: Mapping[str, bytes]) -> str:
+        """Return the project file."""
+        return next(name for name in files if name.endswith(".pjx"))
+
+    def reading(self) -> Mapping[str, object]:
+        """Let the reader keep the points as they stand in fPart."""
+        return {"frame": "keep"}
 
     def files(self, program: Program) -> dict[str, bytes]:
         """Return the application folder."""
