@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +12,9 @@ import pytest
 
 from sicp_cam.child_process import ChildResult
 from sicp_formats.cad import part as cad_part
+
+# Tests are imported by path (importlib mode); the programs that they share stand beside them.
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture

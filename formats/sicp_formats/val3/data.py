@@ -6,8 +6,9 @@ The manufacturer's tool leaves out what has its default value; the defaults stan
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from sicp_formats.robot.motion import number_of, pose_xyz
 from sicp_formats.robot.program import RobotError
 from sicp_formats.val3.xml import Element
 
-__all__ = ["GEOMETRY", "ITEM", "Variable", "Variables"]
+__all__ = ["GEOMETRY", "ITEM", "Variable", "Variables", "declarations"]
 
 ITEM = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)[ \t]*(?:\[((?:[^\[\]]|\[[^\[\]]*\])*)\])?", re.ASCII)
 """A variable or an element of one: name, and index if there is one."""
@@ -33,7 +34,10 @@ _DEEPEST_FRAME = 32
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable: its type without the suffix of six-axis arms, its size, and the attributes of its elements by key."""
+    """A variable: its type without the suffix of six-axis arms, its size, and the attributes of its elements by key.
+
+    A collection is indexed by texts; `public` variables are seen by other applications.
+    """
 
     name: str
     type: str
@@ -41,6 +45,8 @@ class Variable:
     values: Mapping[str, tuple[int, Mapping[str, str]]]
     file: Path
     line: int
+    collection: bool = False
+    public: bool = False
 
 
 @dataclass(slots=True)
@@ -60,7 +66,8 @@ class Variables:
         """
         if root.name.lower() not in ("database", "datalist"):
             raise FormatError(file, f"<{printable(root.name, 40)}> is not the root of a .dtx file; is it one?", line=1)
-        for variable in _s7(file, root) if root.name.lower() == "database" else _s6(file, root):
+        for declare in declarations(file, root):
+            variable = declare()
             self.known[variable.name] = variable
 
     def type_of(self, name: str) -> str | None:
@@ -145,31 +152,42 @@ class Variables:
             yield name
 
 
-def _s7(file: Path, root: Element) -> Iterator[Variable]:
-    for data in root.all("data"):
-        name, kind = data.attributes.get("name", ""), data.attributes.get("type", "")
-        values = {}
-        for place, value in enumerate(child for child in data.children if child.name.lower() == "value"):
-            key = value.attributes.get("key", str(place)).strip()
-            values[key] = (value.line, value.attributes)
-        size = _size(file, data, data.attributes.get("size", str(max(len(values), 1))))
-        yield Variable(name, _plain(kind), size, values, file, data.line)
+def declarations(file: Path, root: Element) -> Iterator[Callable[[], Variable]]:
+    """Yield for each variable of a .dtx file what makes it; a call raises FormatError if its size is no number."""
+    if root.name.lower() == "database":
+        for data in root.all("data"):
+            yield partial(_s7, file, data)
+    else:
+        for section in root.children:
+            for data in section.children:
+                yield partial(_s6, file, data)
 
 
-def _s6(file: Path, root: Element) -> Iterator[Variable]:
-    """Yield the variables of sections such as pointSection, whose values lie one level deeper than in s7."""
-    for section in root.children:
-        for data in section.children:
-            father = next((_father(child) for child in data.children if child.name.endswith("Father")), {})
-            values = {}
-            for place, value in enumerate(child for child in data.children if child.name.startswith("value")):
-                attributes = dict(father) | value.attributes
-                for inner in value.children:
-                    if inner.name != "io":
-                        attributes |= inner.attributes
-                values[value.attributes.get("index", str(place)).strip()] = (value.line, attributes)
-            size = _size(file, data, data.attributes.get("size", str(max(len(values), 1))))
-            yield Variable(data.attributes.get("name", ""), _plain(data.name), size, values, file, data.line)
+def _s7(file: Path, data: Element) -> Variable:
+    name, kind = data.attributes.get("name", ""), data.attributes.get("type", "")
+    values = {}
+    for place, value in enumerate(child for child in data.children if child.name.lower() == "value"):
+        key = value.attributes.get("key", str(place)).strip()
+        values[key] = (value.line, value.attributes)
+    size = _size(file, data, data.attributes.get("size", str(max(len(values), 1))))
+    collection = data.attributes.get("xsi:type", "array") == "collection"
+    public = data.attributes.get("access", "private") == "public"
+    return Variable(name, _plain(kind), size, values, file, data.line, collection, public)
+
+
+def _s6(file: Path, data: Element) -> Variable:
+    """Return a variable of a section such as pointSection, whose values lie one level deeper than in s7."""
+    father = next((_father(child) for child in data.children if child.name.endswith("Father")), {})
+    values = {}
+    for place, value in enumerate(child for child in data.children if child.name.startswith("value")):
+        attributes = dict(father) | value.attributes
+        for inner in value.children:
+            if inner.name != "io":
+                attributes |= inner.attributes
+        values[value.attributes.get("index", str(place)).strip()] = (value.line, attributes)
+    size = _size(file, data, data.attributes.get("size", str(max(len(values), 1))))
+    public = data.attributes.get("public", "false") == "true"
+    return Variable(data.attributes.get("name", ""), _plain(data.name), size, values, file, data.line, False, public)
 
 
 def _father(element: Element) -> dict[str, str]:

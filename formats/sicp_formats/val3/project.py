@@ -13,7 +13,7 @@ from sicp_formats.robot.program import Statement
 from sicp_formats.val3.data import Variables
 from sicp_formats.val3.xml import Element, read_xml
 
-__all__ = ["Program", "Project", "open_project"]
+__all__ = ["Program", "Project", "lies_inside", "open_project", "program_of", "project_file"]
 
 _COMMENT = re.compile(r'((?:[^"/]|"[^"]*"|/(?!/))*)//(.*)', re.DOTALL)
 _LONGEST_LINE = 2000
@@ -52,7 +52,7 @@ class Project:
             if wanted not in self.program_files:
                 return None
             file = self.program_files[wanted]
-            self._programs[wanted] = _program(file, read_xml(file, self.limits)[0])
+            self._programs[wanted] = program_of(file, read_xml(file, self.limits)[0])
         return self._programs[wanted]
 
 
@@ -64,7 +64,7 @@ def open_project(path: Path, limits: Limits) -> Project:
     FormatError
         If there is not exactly one .pjx file, or a file is missing, lies elsewhere or is not what it should be.
     """
-    file = _project_file(path)
+    file = project_file(path)
     root, content = read_xml(file, limits)
     if root.name.lower() != "project":
         what = f"<{printable(root.name, 40)}> is not the root of a .pjx file; give the .pjx of a VAL3 application"
@@ -83,7 +83,14 @@ def open_project(path: Path, limits: Limits) -> Project:
     return Project(file, content, unit, unit_line, variables, limits, programs)
 
 
-def _project_file(path: Path) -> Path:
+def project_file(path: Path) -> Path:
+    """Return the .pjx of an application, from its folder or any of its files.
+
+    Raises
+    ------
+    FormatError
+        If there is not exactly one beside the file.
+    """
     if path.suffix.lower() == ".pjx" or path.name.lower().endswith(".pjx.gz"):
         return path
     folder = path if path.is_dir() else path.parent
@@ -105,7 +112,7 @@ def _listed(project: Path, root: Element, kind: str) -> Iterator[Path]:
         name = element.attributes.get("file", "").replace("\\", "/")
         if not name:
             raise FormatError(project, f"a {kind} without a file; correct the project", line=element.line)
-        if not _lies_inside(project, name):
+        if not lies_inside(project, name):
             what = (
                 f"the {kind} file {printable(name, 60)!r} lies outside of the folder of the application; copy it there"
             )
@@ -114,7 +121,8 @@ def _listed(project: Path, root: Element, kind: str) -> Iterator[Path]:
         yield project.parent / name
 
 
-def _lies_inside(project: Path, name: str) -> bool:
+def lies_inside(project: Path, name: str) -> bool:
+    """Say whether a file that a project names lies in its folder."""
     try:
         folder = project.resolve().parent
         return (folder / name).resolve().is_relative_to(folder)
@@ -122,7 +130,14 @@ def _lies_inside(project: Path, name: str) -> bool:
         return False
 
 
-def _program(file: Path, root: Element) -> Program:
+def program_of(file: Path, root: Element) -> Program:
+    """Return the program of a .pgx file.
+
+    Raises
+    ------
+    FormatError
+        If there is none, or its code does not stand between begin and end.
+    """
     program = next(root.all("program"), None)
     code = None if program is None else next(program.all("code"), None)
     if program is None or code is None:

@@ -13,7 +13,7 @@ from sicp_cam.limits import Limits
 from sicp_formats.paths.text import program_text
 from sicp_formats.source import read_bytes
 
-__all__ = ["Element", "read_xml"]
+__all__ = ["Element", "parse_xml", "read_xml"]
 
 _DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
 _DEEPEST = 32
@@ -47,13 +47,18 @@ def read_xml(path: Path, limits: Limits) -> tuple[Element, bytes]:
         If the file cannot be read, is not well-formed, is nested too deep, or defines entities.
     """
     content = read_bytes(path, limits)
+    return parse_xml(path, content), content
+
+
+def parse_xml(path: Path, content: bytes) -> Element:
+    """Return the root of an XML file whose bytes are read already; errors as those of `read_xml`."""
     text = program_text(path, content)
     declared = text.find("<!DOCTYPE")
     if declared >= 0:
         raise FormatError(
             path, "has a DOCTYPE, which no VAL3 file has; take it out", line=text.count("\n", 0, declared) + 1
         )
-    return _Tree(path).parse(text), content
+    return _Tree(path).parse(text)
 
 
 class _Tree:
