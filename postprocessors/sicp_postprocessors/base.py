@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from sicp_cam.errors import OutputError, PathError, printable
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import Program
+from sicp_cam.model import EventKind, Program
 from sicp_postprocessors.checks import common_findings
 from sicp_postprocessors.options import NoOptions, build_options
 
@@ -45,6 +45,14 @@ class Postprocessor(ABC):
     """Frozen dataclass of the options: each field with a default, and under it a docstring that the user reads."""
     suffix: ClassVar[str] = ""
     """Suffix of the file that it writes, with its dot; none where a program is a folder."""
+    holds_axes: ClassVar[bool] = True
+    """False: its programs hold tips alone."""
+    holds_feeds: ClassVar[bool] = True
+    """False: its programs hold no speeds."""
+    carries_frame: ClassVar[bool] = False
+    """True: its programs state the pose of their frame, so that the operator sees and can change it."""
+    written_events: ClassVar[frozenset[EventKind]] = frozenset()
+    """Kinds of events that it has words for; others are told as findings, because they would be lost."""
     missing_feed: ClassVar[Level] = Level.FAIL
     """How much a cutting move without feed matters to the controller."""
     options: Any
@@ -59,6 +67,17 @@ class Postprocessor(ABC):
             With every option that is unknown or does not fit.
         """
         self.options = build_options(self.name, self.Options, options or {})
+
+    @classmethod
+    def capabilities(cls) -> dict[str, str]:
+        """Return what the programs of this post can hold, in words, for the list of plug-ins."""
+        held = ["tips", *(["tool axes"] if cls.holds_axes else []), *(["feeds"] if cls.holds_feeds else [])]
+        return {
+            "moves": " and ".join([", ".join(held[:-1]), held[-1]] if len(held) > 1 else held),
+            "events": ", ".join(sorted(cls.written_events)) or "none",
+            "frame": "stated in the program" if cls.carries_frame else "that of the coordinates; told, not stated",
+            "long paths": "divided" if "max_moves_per_program" in cls.Options.__dataclass_fields__ else "one file",
+        }
 
     def preflight(self, program: Program) -> list[Finding]:
         """Return everything that the controller would refuse or that the operator should know, with move indices.

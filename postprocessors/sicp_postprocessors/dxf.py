@@ -59,6 +59,7 @@ class Dxf(Postprocessor):
     summary = "DXF drawing (R2000) of the tips as 3D polylines, cuts and rapid moves on layers"
     Options = DxfOptions
     suffix = ".dxf"
+    holds_axes = holds_feeds = False
     missing_feed = Level.INFO
     options: DxfOptions
 

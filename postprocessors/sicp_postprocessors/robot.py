@@ -41,6 +41,7 @@ class RobotPostprocessor(LinePostprocessor):
     Options = RobotOptions
     options: RobotOptions
     straight_rapids: ClassVar[bool] = True
+    carries_frame: ClassVar[bool] = True
 
     # --- words of the controller ---
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import Program, Rewritten
+from sicp_cam.model import EventKind, Program, Rewritten
 from sicp_postprocessors.base import Postprocessor, failures
 from sicp_postprocessors.checks import frame_findings, name_findings
 from sicp_postprocessors.text import file_stem
@@ -26,6 +26,7 @@ class Same(Postprocessor):
 
     name = "same"
     summary = "the program that was read, in its own dialect, with corrected coordinates"
+    written_events = frozenset(EventKind)
     missing_feed = Level.WARN
 
     def __init__(self, options: Mapping[str, object] | None = None) -> None:

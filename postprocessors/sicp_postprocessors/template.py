@@ -111,7 +111,6 @@ class LinePostprocessor(Postprocessor):
     comment_drop: ClassVar[str] = ""
     """Characters that a comment may not hold, such as those that end it."""
     written_events: ClassVar[frozenset[EventKind]] = frozenset(EventKind) - {EventKind.OTHER}
-    """Kinds of events that the verbs have words for."""
     straight_rapids: ClassVar[bool] = False
     """True: rapid moves are straight, at a speed of `feeds_mm_min`; only the first move may go any way in space."""
     modal_speed: ClassVar[bool] = False

@@ -111,6 +111,7 @@ def _told(name: str, as_json: bool) -> int:
                 "summary": one.summary,
                 "options": option_entries(one.options, f"--set {one.prefix}."),
                 "any_option": one.any_option,
+                "capabilities": dict(one.capabilities),
             }
             for one in described
         ]
@@ -133,6 +134,7 @@ def _description(one: PluginOptions) -> Iterator[str]:
     yield f"{plugin.name}: {kind}, {plugin.value}, from {plugin.owner}"
     if one.summary:
         yield printable(one.summary)
+    yield from (f"  {matter}: {printable(what)}" for matter, what in one.capabilities.items())
     if one.options:
         of_job = f"as below, in a job file in the table [options.{one.prefix}]"
         where = {"out": "of convert", "check": "of check"}.get(one.role, of_job)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
-from dataclasses import dataclass, is_dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, is_dataclass
+from types import MappingProxyType
 from typing import Any
 
 from sicp_cam.errors import JobError, printable
@@ -34,6 +35,8 @@ class PluginOptions:
         What it takes by name.
     any_option
         True if it takes further names, which only its own documentation tells.
+    capabilities
+        What the programs of a post can hold: a few words for each matter.
     """
 
     plugin: Plugin
@@ -41,6 +44,7 @@ class PluginOptions:
     summary: str
     options: tuple[Option, ...]
     any_option: bool
+    capabilities: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def prefix(self) -> str:
@@ -86,9 +90,10 @@ def plugin_options(plugin: Plugin) -> PluginOptions:
         )
     kind = getattr(thing, "Options", None)
     told = str(getattr(thing, "summary", "") or summary(thing))
+    capabilities: Mapping[str, str] = getattr(thing, "capabilities", dict)()
     if isinstance(kind, type) and is_dataclass(kind):
-        return PluginOptions(plugin, "post", told, dataclass_options(kind), any_option=False)
-    return PluginOptions(plugin, "post", told, (), any_option=True)
+        return PluginOptions(plugin, "post", told, dataclass_options(kind), False, capabilities)
+    return PluginOptions(plugin, "post", told, (), True, capabilities)
 
 
 def keyword_names(reader: Callable[..., Any]) -> list[str]:
