@@ -10,9 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from sicp_cam.errors import FormatError, JobError, printable
+from sicp_cam.findings import Finding
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_formats import apt, gcode, path_csv
+from sicp_formats.apt.check import check as check_apt
+from sicp_formats.gcode.check import check as check_gcode
+from sicp_formats.path_csv.check import check as check_csv
 from sicp_formats.path_csv.columns import NUMBER_CELL
 from sicp_formats.path_csv.rows import cells_of, delimiter_of, without_remark
 from sicp_formats.paths.findings import Notice, Tally
@@ -20,13 +24,14 @@ from sicp_formats.paths.text import program_lines
 from sicp_formats.robot.motion import number_of
 from sicp_formats.source import read_bytes
 
-__all__ = ["read_path"]
+__all__ = ["check", "read_path"]
 
 _READERS: dict[str, tuple[str, Callable[..., ToolPath]]] = {
     "apt": ("APT", apt.read_path),
     "nc": ("G-code", gcode.read_path),
     "csv": ("a table", path_csv.read_path),
 }
+_CHECKERS: dict[str, Callable[..., tuple[Finding, ...]]] = {"apt": check_apt, "nc": check_gcode, "csv": check_csv}
 _APT_WORDS = (
     "GOTO|FEDRAT|FROM|GODLTA|SPINDL|LOADTL|COOLNT|CUTTER|UNITS?|MULTAX|TLAXIS|CIRCLE|PPRINT|TOOLPATH|MSYS|INDIRV|TLON"
     "|LOAD|TURRET|PPFUN|INTOL|OUTTOL|CYCLE|DELAY|SYN"
@@ -72,8 +77,7 @@ def read_path(
     JobError
         If that reader does not take an option.
     """
-    lines = program_lines(path, read_bytes(path, limits), limits)
-    kind = _kind(path, [line for line in lines if line.strip() and len(line) <= _LONGEST_LINE][:_LINES_LOOKED_AT])
+    kind = _kind_of(path, limits)
     told, reader = _READERS[kind]
     arguments = _arguments(told, reader, options)
     if "recover" in inspect.signature(reader).parameters:
@@ -83,6 +87,29 @@ def read_path(
     tally.note(Notice.TEXT_READ_AS, 0, f"{told}; if that is wrong, say what it is with --set path.format=SUFFIX")
     findings = sorted((*found.findings, *tally.findings(path)), key=lambda finding: finding.code)
     return replace(found, findings=tuple(findings))
+
+
+def check(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[Finding, ...]:
+    """Check a text file as what its words prove it to be: APT, G-code or a table.
+
+    Parameters
+    ----------
+    path
+        The file.
+    limits
+        Caps on it.
+
+    Raises
+    ------
+    FormatError
+        If it is no text, or cannot be told.
+    """
+    return _CHECKERS[_kind_of(path, limits)](path, limits=limits)
+
+
+def _kind_of(path: Path, limits: Limits) -> str:
+    lines = program_lines(path, read_bytes(path, limits), limits)
+    return _kind(path, [line for line in lines if line.strip() and len(line) <= _LONGEST_LINE][:_LINES_LOOKED_AT])
 
 
 def _kind(path: Path, lines: list[str]) -> str:

@@ -10,10 +10,11 @@ from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_formats.krl.data import Values
 from sicp_formats.krl.run import KrlRunner, Subprogram
+from sicp_formats.krl.text import data_file, without_comment
 from sicp_formats.paths.moves import MoveList, check_options
 from sicp_formats.paths.text import program_lines
 from sicp_formats.robot.motion import RobotMoves, subprograms_named, tool_side
-from sicp_formats.robot.program import Statement, without_strings
+from sicp_formats.robot.program import Statement
 from sicp_formats.source import read_bytes
 
 __all__ = ["read_path"]
@@ -94,7 +95,7 @@ def _subprograms(path: Path, lines: list[str]) -> dict[str, Subprogram]:
     found: dict[str, Subprogram] = {}
     name, takes_arguments, statements, inside = "", False, list[Statement](), 0
     for number, line in enumerate(lines, 1):
-        code, comment = _without_comment(line)
+        code, comment = without_comment(line)
         if comment and inside:
             statements.append(Statement(number, comment))
         if not code or code.startswith("&"):
@@ -120,23 +121,15 @@ def _subprograms(path: Path, lines: list[str]) -> dict[str, Subprogram]:
     return found
 
 
-def _without_comment(line: str) -> tuple[str, str]:
-    """Return the code of a line, and its comment with the semicolon."""
-    place = without_strings(line).find(";")
-    return (line.strip(), "") if place < 0 else (line[:place].strip(), line[place:].strip())
-
-
 def _values(path: Path, limits: Limits) -> Values:
     """Return the values that the .dat file beside the program states, if there is one."""
     # Joint angles that every controller declares in its own configuration; which ones does not matter here.
     values = Values({f"XHOME{number}": {"A1": 0.0} for number in ("", 1, 2, 3, 4, 5)})
-    stem = path.name[: path.name.lower().rindex(".src")] if ".src" in path.name.lower() else path.stem
-    candidates = [path.with_name(stem + suffix) for suffix in (".dat", ".DAT", ".dat.gz")]
-    beside = next((file for file in candidates if file.is_file()), None)
+    beside = data_file(path)
     if beside is None:
         return values
     for number, line in enumerate(program_lines(beside, read_bytes(beside, limits), limits), 1):
-        code = _without_comment(line)[0]
+        code = without_comment(line)[0]
         if code.count("{") != code.count("}"):
             raise FormatError(beside, "a brace is not closed; is the file complete?", line=number)
         values.assign(code)

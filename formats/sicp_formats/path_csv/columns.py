@@ -9,7 +9,15 @@ from typing import Literal, TypeAlias
 
 from sicp_cam.errors import printable
 
-__all__ = ["NUMBER_CELL", "Columns", "HeaderError", "columns_of_names", "columns_of_width", "names_of_option"]
+__all__ = [
+    "NUMBER_CELL",
+    "OWN_HEADER",
+    "Columns",
+    "HeaderError",
+    "columns_of_names",
+    "columns_of_width",
+    "names_of_option",
+]
 
 Kind: TypeAlias = Literal["axis", "angles", "quaternion"]
 
@@ -43,8 +51,9 @@ _FEEDS = {
 }
 _BRACKETED = re.compile(r"(.*?)[\s_]*[(\[]([^()\[\]]*)[)\]]", re.DOTALL)
 _SUFFIXED = re.compile(r"(.+?)_(mm/min|mm_min|mm/s|mm_s|m/min|m_min|mm|cm|m|inch|in|deg)")
-# What this package itself writes; its unit is settled to be the millimetre.
-_OWN_HEADER = ("x", "y", "z", "i", "j", "k", "feed", "rapid", "status")
+OWN_HEADER = ("x", "y", "z", "i", "j", "k", "feed", "rapid", "status")
+"""What this package itself writes; its unit is settled to be the millimetre."""
+
 _UNUSED = ("-", "skip", "_")
 
 
@@ -196,7 +205,7 @@ def _length_unit(parsed: Sequence[tuple[str, str]], names: Sequence[str]) -> str
     lengths = {_LENGTHS.get(unit) for unit in units}
     if len(lengths) > 1:
         raise HeaderError("the header gives x, y and z different units; use one")
-    return lengths.pop() or ("mm" if tuple(names[: len(_OWN_HEADER)]) == _OWN_HEADER else None)
+    return lengths.pop() or ("mm" if tuple(names[: len(OWN_HEADER)]) == OWN_HEADER else None)
 
 
 def _mm_min_per_feed(unit: str) -> float | None:

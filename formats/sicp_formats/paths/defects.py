@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from pathlib import Path
 
 from sicp_cam.errors import printable
 from sicp_cam.findings import Finding, Level
 
-__all__ = ["Defects"]
+__all__ = ["Check", "Defects", "check_characters"]
 
 _MOST = 5
 _NUMBER = re.compile(r"[0-9.]+")
+
+
+class Check(IntEnum):
+    """Codes of what is wrong with programs other than G-code and VAL3: the kind of defect, in whatever language."""
+
+    FORM = 880
+    NAMES = 881
+    SYMBOLS = 882
+    SPEED = 883
+    ZONE = 884
+    ORIENTATION = 885
+    TOOL = 886
+    UNITS = 887
+    WORDS = 888
+    TEXT = 889
 
 
 @dataclass(slots=True)
@@ -60,4 +77,14 @@ class Defects:
             return
         self._last[kind] = len(self._found)
         name = printable(str(self.path))
-        self._found.append(Finding(code, level, printable(message, 300), f"{name}, line {line}" if line else name))
+        self._found.append(Finding(int(code), level, printable(message, 300), f"{name}, line {line}" if line else name))
+
+
+def check_characters(defects: Defects, lines: Sequence[str], line_length: int | None = None) -> None:
+    """Note characters that controllers may stop at, and lines longer than a length."""
+    for number, line in enumerate(lines, 1):
+        if not line.isascii():
+            odd = next(character for character in line if not character.isascii())
+            defects.warn(Check.TEXT, f"{odd!r} is no ASCII character; controllers may stop at it", number)
+        if line_length is not None and len(line) > line_length:
+            defects.fail(Check.TEXT, f"the line has {len(line)} characters, more than {line_length}", number)

@@ -15,25 +15,28 @@ from sicp_cam.model import FloatArray
 from sicp_formats.robot.motion import number_of, pose_of_quaternion, pose_xyz
 from sicp_formats.robot.program import RobotError, split_arguments
 
-__all__ = ["ASSIGNED", "Data", "Target", "arguments_of", "parsed_list"]
+__all__ = ["ASSIGNED", "DECLARED", "PREDEFINED_MM_S", "Data", "Target", "arguments_of", "parsed_list"]
 
 Nested: TypeAlias = "float | str | list[Nested]"
 
 ASSIGNED = re.compile(r"(\w+)[ \t]*(\{[^}]*\})?((?:\.\w+)*)[ \t]*:=(.*)", re.ASCII | re.DOTALL)
 """An assignment: name, index, component and value."""
 
-_DECLARED = re.compile(
+DECLARED = re.compile(
     r"(?:(?:LOCAL|TASK)[ \t]+)?(CONST|PERS|VAR)[ \t]+(\w+)[ \t]+(\w+)[ \t]*(?:\{[^}]*\}[ \t]*)?(?::=(.*))?",
     re.ASCII | re.IGNORECASE | re.DOTALL,
 )
+"""A declaration: storage, type, name and value."""
+
 _CALL = re.compile(r"(\w+)[ \t]*\((.*)\)[ \t]*", re.ASCII | re.DOTALL)
 _ELEMENT = re.compile(r"(\w+)[ \t]*\{[ \t]*([0-9]{1,9})[ \t]*\}", re.ASCII)
 _SWITCH = re.compile(r"[ \t]*(\w+)[ \t]*(?::=(.*))?", re.ASCII | re.DOTALL)
 _DEEPEST = 8
-_PREDEFINED_MM_S = (
+PREDEFINED_MM_S = (
     *(5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800),
     *(1000, 1500, 2000, 2500, 3000, 4000, 5000, 6000, 7000),
 )
+"""Speeds that every controller knows: v5 to v7000."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +99,7 @@ class Data:
 
     def declare(self, text: str) -> bool:
         """Take a declaration; return False if the text is none."""
-        match = _DECLARED.fullmatch(text)
+        match = DECLARED.fullmatch(text)
         if match is None:
             return False
         value = match[4]
@@ -105,7 +108,7 @@ class Data:
 
     def declared_names(self, texts: Iterable[str]) -> list[str]:
         """Return the lower-case names that some of the statements declare."""
-        return [match[3].lower() for text in texts if (match := _DECLARED.fullmatch(text))]
+        return [match[3].lower() for text in texts if (match := DECLARED.fullmatch(text))]
 
     def assign(self, text: str) -> str | None:
         """Take an assignment; return the type of what it changes, None if the text is no assignment."""
@@ -187,7 +190,7 @@ class Data:
         if name not in self.known:
             if name == "vmax":
                 return None
-            if name in [f"v{speed}" for speed in _PREDEFINED_MM_S]:
+            if name in [f"v{speed}" for speed in PREDEFINED_MM_S]:
                 return float(name[1:])
         kind, value = self._named(text)
         if kind == "speeddata" and not value.startswith("["):
