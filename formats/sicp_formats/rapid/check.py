@@ -72,12 +72,14 @@ def check(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[Finding, ...]
         moves.check(routine.statements)
     used = moves.used | _named_in_values(data)
     for kind, noun in (_OF_DATA | _OF_CELL).items():
-        check_declared(defects, {n: d.line for n, d in declared.items() if d.kind == kind}, used, noun)
+        unused = {d.name: d.line for key, d in declared.items() if d.kind == kind and key not in used}
+        check_declared(defects, unused, (), noun)
     return defects.findings()
 
 
 @dataclass(frozen=True, slots=True)
 class _Declared:
+    name: str
     kind: str
     storage: str
     line: int
@@ -112,7 +114,7 @@ def _declare(defects: Defects, statement: Statement, data: Data, declared: dict[
     check_name(defects, name, statement.line, longest=_LONGEST_NAME, allowed=_NAME, noun=kind)
     if name.lower() in declared:
         defects.fail(Check.SYMBOLS, f"{name} is declared twice", statement.line)
-    declared[name.lower()] = _Declared(kind, storage, statement.line)
+    declared[name.lower()] = _Declared(name, kind, storage, statement.line)
     data.declare(statement.text)
     value = (found[4] or "").strip()
     if kind in _OF_CELL and storage != "PERS":
