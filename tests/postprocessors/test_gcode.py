@@ -233,7 +233,7 @@ class TestRotary:
         assert [f.where for f in told] == ["moves 1 to 3, lines 11 to 13"] and told[0].level is Level.WARN
 
     def test_words_that_miss_the_axis_are_stopped(self, monkeypatch):
-        monkeypatch.setattr("sicp_postprocessors.gcode.head_angles", lambda *a: _off(head_angles(*a)))
+        monkeypatch.setattr("sicp_postprocessors.gcode.post.head_angles", lambda *a: _off(head_angles(*a)))
         with pytest.raises(PathError, match="move 0, line 10: the rotary words miss the tool axis"):
             GCode({"orientation": "rotary"}).write(simple_program())
 

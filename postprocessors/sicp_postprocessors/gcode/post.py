@@ -13,7 +13,7 @@ from sicp_cam.model import FloatArray, Program
 from sicp_cam.units import mm_per_unit
 from sicp_postprocessors.base import failures
 from sicp_postprocessors.checks import frame_findings, frame_name, move_place, stretch_findings
-from sicp_postprocessors.gcode_options import GCodeOptions
+from sicp_postprocessors.gcode.options import GCodeOptions
 from sicp_postprocessors.numbers import fixed, rounded, trimmed
 from sicp_postprocessors.options import flag
 from sicp_postprocessors.rotary import HeadAngles, axes_from_angles, axis_errors_deg, head_angles
