@@ -29,7 +29,7 @@ class Choice:
     good
         Those of them that follow the whole path.
     others
-        Where none does: other configurations that would.
+        Where none does: other configurations that would, the best first.
     """
 
     followed: JointPath
@@ -55,8 +55,11 @@ def matching(words: Iterable[str]) -> tuple[Configuration, ...]:
 def choose(arm: Arm, places: Places, asked: tuple[Configuration, ...]) -> Choice:
     """Follow the path in the configurations that were asked for, and in the others where none of these does."""
     best, good = _best(arm, places, asked)
-    others = tuple(c for c in CONFIGURATIONS if c not in asked)
-    return Choice(best, asked, good, () if good or not others else _best(arm, places, others)[1])
+    left = tuple(c for c in CONFIGURATIONS if c not in asked)
+    if good or not left:
+        return Choice(best, asked, good, ())
+    other, can = _best(arm, places, left)
+    return Choice(best, asked, good, tuple(sorted(can, key=lambda c: c != other.configuration)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -180,7 +180,7 @@ def _change_findings(path: ToolPath, arm: Arm, places: Places, followed: JointPa
     hopeless = np.isin(cut_of_move, np.unique(cut_of_move[nowhere]))
     change = "the arm would have to change its configuration within this cut: none follows the whole of it"
     yield from stretches_told(path, lost & ~hopeless, 666, Level.FAIL, lambda _: change)
-    if not lost.any() and not nowhere.any():
+    if not lost.any():
         spans = "; ".join(f"{move_place(path, *span)}: {c}" for span, c in _spans(cuts, found.cuts))
         message = f"no configuration follows the whole path; divide it at its rapid moves: {spans}"
         yield Finding(666, Level.FAIL, message, move_place(path, 0))
