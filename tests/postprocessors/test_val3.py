@@ -19,7 +19,7 @@ from sicp_postprocessors.orientations import (
     six_from_pose,
 )
 from sicp_postprocessors.val3 import Val3, application_name
-from sicp_postprocessors.val3.xml import Variable, data_file, program_file
+from sicp_postprocessors.val3.xml import S7, Variable
 
 MOVES = ("movej", "movel")
 TEST_VECTOR = np.array(
@@ -382,7 +382,7 @@ class TestSpindleAndTools:
         told = {f.code: f.message for f in Cell().preflight(simple_program())}
         assert "--set post.cell_2.tool=x,y,z,rx,ry,rz," in told[630]
         assert told[631].endswith("--set post.cell_2.cell=x,y,z,rx,ry,rz")
-        assert "--set post.cell_2.spindle_speed=num" in told[634]
+        assert "--set post.cell_2.spindle_speed=aio" in told[634]
         links = [f.message for f in Cell().preflight(simple_program()) if f.code == 632]
         for kind, message in zip(("spindle", "coolant"), links, strict=True):
             assert f"--set post.cell_2.{kind}_output=OUTPUT" in message
@@ -499,11 +499,11 @@ def test_links_are_escaped():
 @pytest.mark.parametrize("text", ["\x01", "\ufffe", "\ud800", "\x00"])
 def test_characters_that_xml_forbids_are_refused(text):
     with pytest.raises(OutputError, match="forbids"):
-        data_file([Variable("x", "num", [{"value": text}])])
+        S7().data_file([Variable("x", "num", [{"value": text}])])
     with pytest.raises(OutputError, match="forbids"):
-        program_file("start", [f"// {text}"])
+        S7().program_file("start", [f"// {text}"])
 
 
 def test_the_end_mark_of_code_is_refused():
     with pytest.raises(OutputError, match="program start holds ]]>"):
-        program_file("start", ["// ]]>"])
+        S7().program_file("start", ["// ]]>"])
