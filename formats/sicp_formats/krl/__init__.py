@@ -1,4 +1,4 @@
-"""Read KUKA KRL programs as tool paths: a .src file, and the .dat file of the same name beside it."""
+"""Read KUKA KRL programs as tool paths: a .src file, the .dat file of the same name, and programs that it calls."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from sicp_cam.errors import FormatError
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_formats.krl.data import Values
-from sicp_formats.krl.run import KrlRunner, Subprogram
+from sicp_formats.krl.run import KrlRunner, Module, Subprogram
 from sicp_formats.krl.text import data_file, without_comment
 from sicp_formats.paths.moves import MoveList, check_options
 from sicp_formats.paths.text import program_lines
+from sicp_formats.robot.files import file_beside
 from sicp_formats.robot.motion import RobotMoves, subprograms_named, tool_side
 from sicp_formats.robot.program import Statement
 from sicp_formats.source import read_bytes
@@ -40,8 +41,9 @@ def read_path(
     """Read a KRL program into a path in mm, mm/min and unit axes (tip to holder).
 
     Executed are PTP (rapid), LIN, CIRC and LIN_REL to points that stand in the program or the .dat file beside it,
-    and calls of subprograms of the same file. Orientations are R = Rz(A) Ry(B) Rx(C); points keep the coordinates that
-    they have in their base. Feeds are $VEL.CP in m/s. Outputs, waits and the like become events.
+    and calls of subprograms of the same file, or of another .src file beside it that bears the name. Orientations are
+    R = Rz(A) Ry(B) Rx(C); points keep the coordinates that they have in their base. Feeds are $VEL.CP in m/s. Outputs,
+    waits and the like become events.
 
     Parameters
     ----------
@@ -76,18 +78,29 @@ def read_path(
     check_options(feed_mm_min=feed_mm_min, chord_mm=chord_mm, step_mm=step_mm)
     side = tool_side(tool_axis)
     content = read_bytes(path, limits)
-    subprograms = _subprograms(path, program_lines(path, content, limits))
+    module = _module(path, content, limits)
     moves = MoveList(path, limits, units, chord_mm, step_mm)
     moves.state_unit("mm", 1)
     robot = RobotMoves(moves, side)
-    runner = KrlRunner(path, subprograms, _values(path, limits), moves, robot, subprograms_named(calls))
-    first = next(iter(subprograms)) if program is None else program.upper()
-    if first not in subprograms:
-        known = ", ".join(list(subprograms)[:10])
+
+    def beside(name: str) -> Module | None:
+        file = file_beside(path, name, ".src")
+        return None if file is None else _module(file, read_bytes(file, limits), limits)
+
+    runner = KrlRunner(module, beside, moves, robot, subprograms_named(calls))
+    first = next(iter(module.subprograms)) if program is None else program.upper()
+    if first not in module.subprograms:
+        known = ", ".join(list(module.subprograms)[:10])
         raise FormatError(path, f"defines no {program}; choose with --set path.program=NAME one of {known}", line=1)
-    runner.call(first, 0, lambda: runner.run_subprogram(first))
+    runner.call(first, 0, lambda: runner.run_subprogram(module, first))
     robot.finish()
+    if runner.files > 1:
+        moves.forget_lines()
     return moves.build(content, format="KRL", name=first.lower(), feed_mm_min=feed_mm_min)
+
+
+def _module(path: Path, content: bytes, limits: Limits) -> Module:
+    return Module(path, _subprograms(path, program_lines(path, content, limits)), _values(path, limits))
 
 
 def _subprograms(path: Path, lines: list[str]) -> dict[str, Subprogram]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from sicp_formats.paths.moves import MoveList
 from sicp_formats.robot.motion import RobotMoves, number_of, pose_zyx
 from sicp_formats.robot.program import Language, RobotError, Runner, Statement, split_arguments, without_strings
 
-__all__ = ["KrlRunner", "Subprogram"]
+__all__ = ["KrlRunner", "Module", "Subprogram"]
 
 _MOVE = re.compile(r"(S?PTP|S?LIN|S?CIRC)(_REL)?(?=[ \t{])[ \t]*(.*)", re.ASCII | re.IGNORECASE)
 _APPROXIMATION = re.compile(r"(?:[ \t]+C_(?:DIS|VEL|ORI|PTP|SPL))+[ \t]*$", re.ASCII | re.IGNORECASE)
@@ -50,24 +50,36 @@ _POSE = ("X", "Y", "Z", "A", "B", "C")
 _JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 _EXTERNAL = ("E1", "E2", "E3", "E4", "E5", "E6")
 _MM_MIN_PER_M_S = 60_000.0
+_MOST_FILES = 1000
 
 
 @dataclass(frozen=True, slots=True)
 class Subprogram:
-    """A subprogram of the file: whether it takes arguments, and its statements."""
+    """A subprogram of a file: whether it takes arguments, and its statements."""
 
     name: str
     takes_arguments: bool
     statements: tuple[Statement, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Module:
+    """A .src file: its subprograms by upper-case name, and the values of the variables in the .dat file beside it."""
+
+    file: Path
+    subprograms: Mapping[str, Subprogram]
+    values: Values
+
+
 class KrlRunner(Runner):
-    """Runs the subprograms of one .src file.
+    """Runs the subprograms of a .src file, and those of files beside it that bear their name.
 
     Parameters
     ----------
-    file, subprograms, values
-        The file, what it defines by upper-case name, and the values of its variables.
+    module
+        The file to begin with.
+    beside
+        Returns the file of a name, None if there is none.
     moves, robot
         Where its moves go.
     calls
@@ -76,24 +88,32 @@ class KrlRunner(Runner):
 
     def __init__(
         self,
-        file: Path,
-        subprograms: Mapping[str, Subprogram],
-        values: Values,
+        module: Module,
+        beside: Callable[[str], Module | None],
         moves: MoveList,
         robot: RobotMoves,
         calls: frozenset[str],
     ) -> None:
         super().__init__(moves, _LANGUAGE, calls)
-        self._file = file
-        self._subprograms = subprograms
-        self._values = values
+        self._module = module
+        self._others: dict[str, Module | None] = {}
+        self._beside = beside
+        self._values = module.values
         self._robot = robot
         self._feed: float | None = 0.0
         self._last: Aggregate = {}
 
-    def run_subprogram(self, name: str) -> None:
-        """Execute a subprogram of the file."""
-        self.run(self._file, self._subprograms[name].statements)
+    @property
+    def files(self) -> int:
+        """Return from how many files statements were read."""
+        return 1 + sum(module is not None for module in self._others.values())
+
+    def run_subprogram(self, module: Module, name: str) -> None:
+        """Execute a subprogram, with the variables of its own file."""
+        before = self._module, self._values
+        self._module, self._values = module, module.values
+        self.run(module.file, module.subprograms[name].statements)
+        self._module, self._values = before
 
     def execute(self, text: str, line: int) -> None:
         """Execute one statement."""
@@ -255,16 +275,28 @@ class KrlRunner(Runner):
 
     def _wait(self, seconds: str, text: str, line: int) -> None:
         value = number_of(seconds)
-        if value is None or value < 0.0:
+        if value == 0.0:
+            self.keep(text, line)  # it only holds the interpreter until the arm is there
+        elif value is None or value < 0.0:
             self.unknown(text, line)
         else:
             self.moves.event(EventKind.DWELL, line, value, text)
 
     def _call(self, name: str, arguments: str, line: int) -> None:
-        subprogram = self._subprograms.get(name.upper())
-        if subprogram is None:
+        known = name.lower() in self._moving_nothing
+        module = self._module if known or name.upper() in self._module.subprograms else self._other(name.upper())
+        subprogram = None if module is None else module.subprograms.get(name.upper())
+        if module is None or subprogram is None:
             self.call(name, line, None)
         elif arguments.strip() or subprogram.takes_arguments:
             raise RobotError(f"the call of {printable(name, 40)} has arguments, which are not followed; write it out")
         else:
-            self.call(name, line, lambda: self.run_subprogram(name.upper()))
+            self.call(name, line, lambda: self.run_subprogram(module, name.upper()))
+
+    def _other(self, name: str) -> Module | None:
+        """Return another file that bears the name of a subprogram, read once."""
+        if name not in self._others:
+            if len(self._others) >= _MOST_FILES:
+                raise RobotError(f"more than {_MOST_FILES} other programs are called")
+            self._others[name] = self._beside(name)
+        return self._others[name]

@@ -1,21 +1,24 @@
-"""Read ABB RAPID modules as tool paths: the moves of `main` and of the procedures that it calls."""
+"""Read ABB RAPID programs as tool paths: the moves of `main` and of the procedures that it calls."""
 
 from __future__ import annotations
 
-from pathlib import Path
+import re
+from pathlib import Path, PureWindowsPath
 
-from sicp_cam.errors import FormatError
+from sicp_cam.errors import FormatError, printable
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_formats.paths.moves import MoveList, check_options
 from sicp_formats.paths.text import program_lines
 from sicp_formats.rapid.data import Data
 from sicp_formats.rapid.run import RapidRunner
-from sicp_formats.rapid.text import Module, read_module
+from sicp_formats.rapid.text import Module, Routine, read_module
 from sicp_formats.robot.motion import RobotMoves, subprograms_named, tool_side
 from sicp_formats.source import read_bytes
 
 __all__ = ["read_path"]
+
+_MODULE = re.compile(r"<Module>([^<>]*)</Module>", re.IGNORECASE)
 
 
 def read_path(
@@ -34,13 +37,13 @@ def read_path(
     """Read a RAPID module into a path in mm, mm/min and unit axes (tip to holder).
 
     Executed are MoveJ (rapid), MoveL and MoveC to robtargets that are declared or written out, Offs and RelTool of
-    them by constants, and calls of procedures of the same module. Points keep the coordinates that they have in their
+    them by constants, and calls of procedures of the same program. Points keep the coordinates that they have in their
     work object. Feeds are those of the speeddata in mm/s. Outputs, waits and the like become events.
 
     Parameters
     ----------
     path
-        The .mod or .prg file.
+        The .mod or .prg file, or the .pgf that lists the modules beside it.
     units
         Must be mm if it is given: RAPID knows no other unit.
     limits
@@ -70,18 +73,44 @@ def read_path(
     check_options(feed_mm_min=feed_mm_min, chord_mm=chord_mm, step_mm=step_mm)
     side = tool_side(tool_axis)
     content = read_bytes(path, limits)
-    module = read_module(path, "\n".join(program_lines(path, content, limits)))
+    files = _listed(path, content, limits) if ".pgf" in path.name.lower() else {path: content}
+    modules = [read_module(file, "\n".join(program_lines(file, text, limits))) for file, text in files.items()]
+    module = _together(path, modules)
     moves = MoveList(path, limits, units, chord_mm, step_mm)
     moves.state_unit("mm", 1)
     robot = RobotMoves(moves, side)
     data = Data()
     for declaration in module.declarations:
         data.declare(declaration.text)
-    runner = RapidRunner(path, module.routines, data, moves, robot, subprograms_named(calls))
+    runner = RapidRunner(module.routines, data, moves, robot, subprograms_named(calls))
     first = _first_routine(path, module, program)
     runner.call(first, 0, lambda: runner.run_routine(first))
     robot.finish()
+    if len(modules) > 1:
+        moves.forget_lines()
     return moves.build(content, format="RAPID", name=module.name or first, feed_mm_min=feed_mm_min)
+
+
+def _listed(path: Path, content: bytes, limits: Limits) -> dict[Path, bytes]:
+    """Return the modules that a .pgf lists, with their text, in its order."""
+    names = _MODULE.findall("\n".join(program_lines(path, content, limits)))
+    if not names:
+        raise FormatError(path, "lists no <Module>; is this a RAPID program (.pgf)?", line=1)
+    files = [path.with_name(PureWindowsPath(name.strip()).name) for name in names]
+    missing = next((file for file in files if not file.is_file()), None)
+    if missing is not None:
+        raise FormatError(path, f"lists {printable(missing.name, 60)}, which does not lie beside it", line=1)
+    return {file: read_bytes(file, limits) for file in files}
+
+
+def _together(path: Path, modules: list[Module]) -> Module:
+    """Return the modules of a program as one; names of procedures must differ."""
+    routines: dict[str, Routine] = {}
+    for module in modules:
+        if twice := sorted(routines.keys() & module.routines.keys()):
+            raise FormatError(path, f"has the procedure {twice[0]} in two modules; rename one of them")
+        routines |= module.routines
+    return Module(modules[0].name, tuple(each for module in modules for each in module.declarations), routines)
 
 
 def _first_routine(path: Path, module: Module, program: str | None) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from pathlib import Path
 
 from sicp_cam.errors import printable
 from sicp_cam.model import EventKind
@@ -61,12 +60,12 @@ def _active(text: str) -> bool:
 
 
 class RapidRunner(Runner):
-    """Runs the procedures of one module.
+    """Runs the procedures of the modules of a program.
 
     Parameters
     ----------
-    file, routines, data
-        The file, its procedures by lower-case name, and its data.
+    routines, data
+        Procedures by lower-case name, and the data of all modules.
     moves, robot
         Where its moves go.
     calls
@@ -75,7 +74,6 @@ class RapidRunner(Runner):
 
     def __init__(
         self,
-        file: Path,
         routines: Mapping[str, Routine],
         data: Data,
         moves: MoveList,
@@ -83,7 +81,6 @@ class RapidRunner(Runner):
         calls: frozenset[str],
     ) -> None:
         super().__init__(moves, Language(_OPENS, _CLOSES, _active), calls)
-        self._file = file
         self._routines = routines
         self._data = data
         self._robot = robot
@@ -94,7 +91,7 @@ class RapidRunner(Runner):
         """Execute a procedure of the module."""
         statements = self._routines[name].statements
         before = {own: self._data.known.get(own) for own in self._data.declared_names(each.text for each in statements)}
-        self.run(self._file, statements)
+        self.run(self._routines[name].file, statements)
         for own, held in before.items():
             self._data.known.pop(own, None)
             if held is not None:

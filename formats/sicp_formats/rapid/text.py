@@ -37,6 +37,7 @@ class Routine:
     name: str
     takes_arguments: bool
     statements: tuple[Statement, ...]
+    file: Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +96,7 @@ def _routine(path: Path, head: str, body: list[Statement], line: int) -> Routine
         raise FormatError(path, f"'PROC {printable(head, 40)}' has no name; correct the line", line=line)
     handlers = [at for at, each in enumerate(body) if each.text.upper() in ("ERROR", "UNDO")]
     # What stands behind ERROR or UNDO runs only when something has gone wrong.
-    return Routine(match[1], bool((match[2] or "").strip()), tuple(body[: handlers[0]] if handlers else body))
+    return Routine(match[1], bool((match[2] or "").strip()), tuple(body[: handlers[0]] if handlers else body), path)
 
 
 def _statements(path: Path, text: str) -> Iterator[Statement]:
