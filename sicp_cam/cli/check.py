@@ -108,12 +108,14 @@ def _run(
 
 def _tell(document: dict[str, Any]) -> None:
     """Say in one line each on stderr which programs may not be run, where the exit code says so."""
+    from sicp_cam.cli.check_lines import counted
+
     for program in document["programs"]:
         name = printable(program["path"])
         levels = [finding["level"] for finding in program["findings"]]
         if program["facts"] is None:
             _log.error("%s", next(each["message"] for each in program["findings"] if each["code"] == 903))
         elif "fail" in levels:
-            _log.error("%s: must not run: %d findings of level fail", name, levels.count("fail"))
+            _log.error("%s: must not run: %s of level fail", name, counted(levels.count("fail"), "finding"))
         elif document["exit_code"] == 7 and "warn" in levels:
-            _log.error("%s: %d warnings under --strict", name, levels.count("warn"))
+            _log.error("%s: %s under --strict", name, counted(levels.count("warn"), "warning"))

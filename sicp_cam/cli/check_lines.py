@@ -8,7 +8,7 @@ from typing import Any
 from sicp_cam.cli.inspect_lines import finding_line
 from sicp_cam.errors import printable
 
-__all__ = ["check_lines"]
+__all__ = ["check_lines", "counted"]
 
 
 def check_lines(document: Mapping[str, Any]) -> Iterator[str]:
@@ -30,6 +30,15 @@ def check_lines(document: Mapping[str, Any]) -> Iterator[str]:
         yield from (f"  {finding_line(finding)}" for finding in findings)
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun.
+
+    >>> counted(1, "move"), counted(2, "move")
+    ('1 move', '2 moves')
+    """
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 def _what(facts: Mapping[str, Any] | None, source: Mapping[str, Any] | None) -> str:
     if facts is None or source is None:
         return "cannot be read"
@@ -37,7 +46,7 @@ def _what(facts: Mapping[str, Any] | None, source: Mapping[str, Any] | None) -> 
     more = facts["different_feeds"] - len(feeds)
     words = [
         facts["format"],
-        f"{facts['moves']} moves, {facts['cuts']} of them cuts",
+        f"{counted(facts['moves'], 'move')}, {facts['cuts']} of them cuts",
         f"{facts['length_mm']:.7g} mm",
         f"feeds {', '.join(f'{feed:.7g}' for feed in feeds)}{f' and {more} more' if more else ''} mm/min"
         if feeds

@@ -174,6 +174,7 @@ def test_plugins_lists_every_reader_and_post(run, files):
     assert code == 0
     assert ["scan", ".ply", "sicp_formats.ply:read_scan", "sicp-cam"] in [row[:4] for row in rows]
     assert ["post", "val3", "sicp_postprocessors.val3:Val3", "sicp-cam"] in [row[:4] for row in rows]
+    assert ["check", ".nc", "sicp_formats.gcode.check:check", "sicp-cam"] in [row[:4] for row in rows]
 
 
 def test_plugins_as_json(run, files):
@@ -207,6 +208,14 @@ def test_a_reader_is_told_option_by_option(run, files):
     assert "--set path.format=... " in run("plugins", "path.apt")[1]
 
 
+def test_a_checker_is_told_option_by_option(run, files):
+    code, out, _ = run("plugins", "check.nc")
+    lines = out.splitlines()
+    assert (code, lines[0].partition(",")[0]) == (0, "nc: checker of programs with that suffix")
+    assert "on the command line of check:" in lines
+    assert "  --set check.line_length=...  whole number; default 255" in lines
+
+
 def test_a_name_that_several_have_tells_of_all(run, files):
     document = json.loads(run("plugins", "csv", "--json")[1])
     assert [(one["role"], one["name"]) for one in document["plugins"]] == [
@@ -214,6 +223,7 @@ def test_a_name_that_several_have_tells_of_all(run, files):
         ("scan", "scan.csv"),
         ("out", "scan.csv"),
         ("path", "path.csv"),
+        ("check", "csv"),
     ]
     assert document["plugins"][0]["options"] is not None
     flags = {option["name"]: option["flag"] for option in document["plugins"][1]["options"]}

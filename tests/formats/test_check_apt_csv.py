@@ -27,7 +27,7 @@ CSV = """x,y,z,i,j,k,feed,rapid,status,u_mm
 10.0000,0.0000,5.0000,0.0000000,0.6000000,0.8000000,900.0000,0,bridged,0.2
 """
 BROKEN = [
-    ("apt", "FINI\n", "", 880, "warn", 13, "no end (FINI)"),
+    ("apt", "FINI\n", "", 880, "warn", 12, "no end (FINI)"),
     ("apt", "GOTO/10,0,50,0,0,1\n", "", 888, "warn", 11, "RAPID without a move"),
     ("apt", "UNITS/MM\n", "", 887, "warn", 0, ""),
     ("apt", "FEDRAT/2000", "UNITS/MM\nFEDRAT/2000", 887, "warn", 7, "comes after the first move in line 6"),

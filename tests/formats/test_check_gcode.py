@@ -90,7 +90,7 @@ BROKEN = [
     ("vector", "%\n(porthole)", "(head)\n%\n(porthole)", 870, "warn", 1, "text before the first %"),
     ("vector", "(porthole)", "(p\u00f6rthole)", 870, "warn", 2, "no ASCII character"),
     ("vector", "(porthole)", f"({'p' * 300})", 870, "fail", 2, "302 characters, more than 255"),
-    ("vector", "N110 M30\n%", "%", 871, "warn", 14, "no end"),
+    ("vector", "N110 M30\n%", "%", 871, "warn", 13, "no end"),
     ("vector", "G21 G90", "G90", 872, "warn", 7, "units"),
     ("vector", "G21 G90", "G21", 872, "warn", 7, "absolute coordinates"),
     ("arcs", "G21 G90 G17", "G21 G90", 872, "warn", 4, "arc before its plane"),

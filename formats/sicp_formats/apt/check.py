@@ -9,7 +9,7 @@ from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_formats.apt.arguments import split_arguments
 from sicp_formats.apt.refusals import switches_on
 from sicp_formats.apt.statements import COMMENT, statements
-from sicp_formats.paths.defects import Check, Defects, check_characters
+from sicp_formats.paths.defects import Check, Defects, check_characters, last_line
 from sicp_formats.paths.text import program_lines
 from sicp_formats.source import read_bytes
 
@@ -45,7 +45,7 @@ def check(path: Path, *, limits: Limits = DEFAULT_LIMITS, line_length: int | Non
         program.take(line, word, arguments)
         if program.ended:
             break
-    program.finish(len(lines))
+    program.finish(last_line(lines))
     return defects.findings()
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from sicp_cam.findings import Finding
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_formats.fanuc_ls.listing import Listing, read_listing
-from sicp_formats.paths.defects import Check, Defects, check_characters
+from sicp_formats.paths.defects import Check, Defects, check_characters, last_line
 from sicp_formats.paths.text import program_lines
 from sicp_formats.robot.check import check_declared, check_name
 from sicp_formats.source import read_bytes
@@ -69,7 +69,7 @@ def _check_form(defects: Defects, lines: Sequence[str], listing: Listing) -> Non
         what = f"the program is called {listing.name}, the file {stem}; the controller takes the name in /PROG"
         defects.warn(Check.NAMES, what, 1)
     if not listing.ended:
-        defects.fail(Check.FORM, "no /END; is the file complete?", len(lines))
+        defects.fail(Check.FORM, "no /END; is the file complete?", last_line(lines))
     for number, line in enumerate(lines, 1):
         if count := _COUNT.search(line):
             there = len(_statement_lines(lines))

@@ -10,7 +10,7 @@ from sicp_cam.findings import Finding
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_formats.gcode.checked_blocks import CheckedBlocks
 from sicp_formats.gcode.words import decimal_mark
-from sicp_formats.paths.defects import Defects
+from sicp_formats.paths.defects import Defects, last_line
 from sicp_formats.paths.text import program_lines
 from sicp_formats.source import read_bytes
 
@@ -57,7 +57,7 @@ def check(
     for number, line in enumerate(lines, 1):
         if blocks.take(line, number):
             break
-    blocks.finish(len(lines))
+    blocks.finish(last_line(lines))
     return defects.findings()
 
 

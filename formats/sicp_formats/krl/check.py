@@ -14,7 +14,7 @@ from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_formats.krl.data import parsed_aggregate
 from sicp_formats.krl.text import data_file, without_comment
 from sicp_formats.paths.arcs import Vector
-from sicp_formats.paths.defects import Check, Defects, check_characters
+from sicp_formats.paths.defects import Check, Defects, check_characters, last_line
 from sicp_formats.paths.text import program_lines
 from sicp_formats.robot.check import Blend, check_blends, check_declared, check_name
 from sicp_formats.robot.motion import number_of
@@ -104,7 +104,7 @@ def _check_data(defects: Defects, lines: Sequence[str], path: Path) -> dict[str,
             if name in points:
                 defects.fail(Check.SYMBOLS, f"the point {point[1]} is declared twice", number)
             points[name] = (number, point[2] or "")
-    for there, word, place in ((begun, "DEFDAT", 1), (ended, "ENDDAT", len(lines))):
+    for there, word, place in ((begun, "DEFDAT", 1), (ended, "ENDDAT", last_line(lines))):
         if not there:
             defects.fail(Check.FORM, f"no {word}; is the file complete?", place)
     return points

@@ -11,7 +11,7 @@ from pathlib import Path
 from sicp_cam.errors import printable
 from sicp_cam.findings import Finding, Level
 
-__all__ = ["Check", "Defects", "check_characters"]
+__all__ = ["Check", "Defects", "check_characters", "last_line"]
 
 _MOST = 5
 _NUMBER = re.compile(r"[0-9.]+")
@@ -88,3 +88,12 @@ def check_characters(defects: Defects, lines: Sequence[str], line_length: int | 
             defects.warn(Check.TEXT, f"{odd!r} is no ASCII character; controllers may stop at it", number)
         if line_length is not None and len(line) > line_length:
             defects.fail(Check.TEXT, f"the line has {len(line)} characters, more than {line_length}", number)
+
+
+def last_line(lines: Sequence[str]) -> int:
+    """Return the 1-based number of the last line that is not blank.
+
+    >>> last_line(["M30", "%", ""])
+    2
+    """
+    return next((number for number in range(len(lines), 0, -1) if lines[number - 1].strip()), 1)

@@ -15,7 +15,7 @@ from sicp_cam.errors import printable
 from sicp_cam.findings import Finding
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_formats.paths.arcs import Vector
-from sicp_formats.paths.defects import Check, Defects, check_characters
+from sicp_formats.paths.defects import Check, Defects, check_characters, last_line
 from sicp_formats.paths.text import program_lines
 from sicp_formats.rapid.data import DECLARED, PREDEFINED_MM_S, Data, Target, arguments_of, parsed_list
 from sicp_formats.rapid.text import Module, read_module
@@ -87,7 +87,7 @@ class _Declared:
 
 def _check_form(defects: Defects, module: Module, lines: list[str]) -> None:
     if not any(line.strip().upper() == "ENDMODULE" for line in lines):
-        defects.fail(Check.FORM, "no ENDMODULE; is the file complete?", len(lines))
+        defects.fail(Check.FORM, "no ENDMODULE; is the file complete?", last_line(lines))
     if not module.name:
         defects.fail(Check.FORM, "no MODULE with a name", 1)
     names = [("module", module.name)] if module.name else []
