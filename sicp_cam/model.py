@@ -349,6 +349,8 @@ class Program:
         (n,) move of the path as it was read that each move is or is a part of, see `Original`; None if not known.
     corrected
         False for a path that was only converted: its coordinates are in the frame that they were read in.
+    placed
+        False before the registration, while nobody knows where the path will lie: nothing is judged that depends on it.
     """
 
     name: str
@@ -360,6 +362,7 @@ class Program:
     overridden: tuple[str, ...] = ()
     source_moves: IntArray | None = None
     corrected: bool = True
+    placed: bool = True
 
     def __post_init__(self) -> None:
         if len(self.status) != len(self.path):

@@ -186,7 +186,8 @@ def _check_posts(job: Job, path: ToolPath) -> None:
         If a post cannot write this path, corrected or not.
     """
     written: dict[str, str] = {}
-    nominal = Program(job.name, path, (Status.APPROACH,) * len(path), source_moves=np.arange(len(path)))
+    status = (Status.APPROACH,) * len(path)
+    nominal = Program(job.name, path, status, source_moves=np.arange(len(path)), placed=False)
     for name in job.post:
         post = plugins.postprocessor(name, job.post_options.get(name, {}))
         suffix = path.original.suffix if name == "same" and path.original is not None else post.suffix

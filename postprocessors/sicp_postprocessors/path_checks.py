@@ -39,7 +39,7 @@ class PreflightOptions:
 
     work_box_mm: tuple[float, float, float, float, float, float] | None = None
     """Two opposite corners x, y, z of the box that the tip may not leave, in the machine's world; none: not checked."""
-    max_feed_mm_min: Annotated[float, Between(0.001, 1e7)] | None = None
+    max_feed_mm_min: Annotated[float | None, Between(0.001, 1e7)] = None
     """Tip speed that no cutting move may exceed; none: not checked."""
     max_axis_deg_mm: Annotated[float, Between(0.001, 1e6)] = 5.0
     """Turn of the tool axis per millimetre of cut above which it is told as a warning."""

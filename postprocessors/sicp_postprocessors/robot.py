@@ -14,6 +14,8 @@ import numpy as np
 
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import Event, EventKind, FloatArray, Program, ToolPath
+from sicp_cam.rigid_motion import apply
+from sicp_postprocessors.arm import Configuration, arm_findings, no_arm_finding
 from sicp_postprocessors.base import failures
 from sicp_postprocessors.checks import frame_name, in_scan_frame
 from sicp_postprocessors.moves import events_in_order
@@ -29,6 +31,8 @@ __all__ = ["ZERO", "RobotPostprocessor"]
 
 ZERO: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _FEED_DECIMALS = 6
+_SAME_HEIGHT_MM = 0.5
+_CONFIGURATION = ("shoulder", "elbow", "wrist")
 
 
 class RobotPostprocessor(LinePostprocessor):
@@ -188,7 +192,37 @@ class RobotPostprocessor(LinePostprocessor):
         if not np.abs(self.pose_in_world(program)[:3, 3]).max() <= LARGEST:
             words = flag(self.name, "cell", "x,y,z,rx,ry,rz")
             findings.append(Finding(605, Level.FAIL, f"the program frame lies beyond {LARGEST:g} mm; check {words}"))
-        return findings
+        return [*findings, *self._arm_findings(program)] if program.placed else findings
+
+    def _arm_findings(self, program: Program) -> list[Finding]:
+        """Return what the path asks of the arm, if a model of it is given."""
+        path, options, arm = program.path, self.options, self.options.arm()
+        if arm is None:
+            return [no_arm_finding(f"name the robot with {flag(self.name, 'robot', 'NAME')}, or a file of it")]
+        T = self.pose_in_world(program)
+        stated_mm = getattr(options, "shoulder_height_mm", 0.0)
+        told = []
+        if stated_mm and abs(stated_mm - arm.shoulder_height_mm) > _SAME_HEIGHT_MM:
+            words = flag(self.name, "shoulder_height_mm", f"{arm.shoulder_height_mm:g}")
+            message = f"shoulder_height_mm is {stated_mm:g}, but that of the {arm.name} is what {words} states"
+            told.append(Finding(669, Level.WARN, message))
+        return told + arm_findings(
+            path,
+            apply(T, path.tips_mm),
+            T[:3, :3] @ self.rotations(path),
+            self.feeds_mm_min(path) / 60.0,
+            self.tool_in_flange(),
+            arm,
+            asked=tuple(str(getattr(options, word, "")) for word in _CONFIGURATION),
+            singular_deg=options.singular_deg,
+            ask=self._ask,
+        )
+
+    def _ask(self, configuration: Configuration) -> str:
+        """Return how to ask for a configuration, where the controller can be asked."""
+        if not all(hasattr(self.options, word) for word in _CONFIGURATION):
+            return str(configuration)
+        return " ".join(flag(self.name, word, getattr(configuration, word)) for word in _CONFIGURATION)
 
     def remarks(self, program: Program) -> Iterator[str]:
         """Return how the points are meant, and how fast and how exactly they are run."""

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from sicp_cam.errors import JobError, printable
 from sicp_cam.ranges import Between
+from sicp_postprocessors.arm import ArmOptions
 from sicp_postprocessors.orientations import Six
 
 __all__ = ["RobotOptions", "Six", "output_words"]
@@ -16,7 +17,7 @@ _SWITCH = re.compile(r"\s*(\S.*?)\s*=\s*([^=:\s]+)\s*:\s*(on|off)\s*", re.IGNORE
 
 
 @dataclass(frozen=True, slots=True)
-class RobotOptions:
+class RobotOptions(ArmOptions):
     """Options of every robot. Poses are x, y, z in mm and rx, ry, rz in degrees, R = Rx Ry Rz."""
 
     tool: Six | None = None
@@ -62,7 +63,7 @@ class RobotOptions:
 
     def problems(self) -> list[str]:
         """Return what does not go together, one line each; a controller adds its own."""
-        return output_words(self.outputs)[1]
+        return [*output_words(self.outputs)[1], *self.arm_problems()]
 
     @property
     def tool_is_known(self) -> bool:

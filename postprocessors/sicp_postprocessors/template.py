@@ -16,7 +16,7 @@ import numpy as np
 from sicp_cam.errors import OutputError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import BoolArray, Event, EventKind, FloatArray, Program, ToolPath
-from sicp_postprocessors.base import SAFETY_NOTE, Postprocessor, head_remarks
+from sicp_postprocessors.base import SAFETY_NOTE, Postprocessor, failures, head_remarks
 from sicp_postprocessors.checks import event_findings, first_move_findings, move_place, name_findings
 from sicp_postprocessors.moves import (
     Moves,
@@ -27,6 +27,7 @@ from sicp_postprocessors.moves import (
     tools_in_use,
 )
 from sicp_postprocessors.options import flag
+from sicp_postprocessors.path_checks import PreflightOptions, path_findings
 from sicp_postprocessors.text import ascii_lines, file_stem
 
 __all__ = ["LinePostprocessor", "Moves"]
@@ -209,6 +210,10 @@ class LinePostprocessor(Postprocessor):
         """Return how far from its target each move may bend into the next (n,)."""
         return np.zeros(len(path))
 
+    def pose_in_world(self, program: Program) -> FloatArray:
+        """Return the pose (4, 4) of the program frame in the machine's world, in which a work box stands."""
+        return np.eye(4)
+
     def events(self, program: Program) -> list[Event]:
         """Return the events in order, as the controller is told of them."""
         return events_in_order(program.path)
@@ -231,12 +236,12 @@ class LinePostprocessor(Postprocessor):
     # --- the walk ---
 
     def preflight(self, program: Program) -> list[Finding]:
-        """Return the findings of every post, and those about name, first move, parts and events that are left out."""
+        """Return the findings of every post, and those about name, first move, parts, lost events and the path."""
         path = program.path
         lost = set(EventKind) - self.written_events - {EventKind.OTHER}
         unknown = [e for e in path.events if e.kind is EventKind.OTHER and self.switched(e) is None]
         unwritten = {EventKind.OTHER} if EventKind.OTHER not in self.written_events else set()
-        return [
+        findings = [
             *super().preflight(program),
             *name_findings(program, self.program_name(program)),
             *first_move_findings(path),
@@ -244,6 +249,9 @@ class LinePostprocessor(Postprocessor):
             *event_findings(unknown, unwritten, f"post {self.name} has no words for it"),
             *self._part_findings(path),
         ]
+        if isinstance(self.options, PreflightOptions) and program.placed and not failures(findings):
+            findings += path_findings(program, self.pose_in_world(program), self.options)
+        return findings
 
     def program_name(self, program: Program) -> str:
         """Return the name of the program as the controller takes it."""

@@ -28,7 +28,8 @@ TEST_VECTOR = np.array(
 
 
 def codes(post, program):
-    return [f.code for f in post.preflight(program)]
+    """Return the codes of the findings, without 669, which tells what is not checked."""
+    return [f.code for f in post.preflight(program) if f.code != 669]
 
 
 class TestEuler:
