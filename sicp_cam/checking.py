@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -29,6 +29,9 @@ Options = Mapping[str, object]
 
 NOT_JUDGED, UNREADABLE = 899, 903
 """Codes of the findings: the text of the program was judged by nobody; the program cannot be read."""
+
+_FRAME_STATED = 317
+"""Warns whoever corrects a path; that a written program says in which frame its points stand is as it should be."""
 
 _MANIFEST = "result.json"
 _MANIFEST_BYTES = 2**26
@@ -253,7 +256,8 @@ def _judged(file: Path, shared: _Shared) -> _Judged:
     except InputError as error:
         findings.append(Finding(UNREADABLE, Level.FAIL, str(error)))
         return _Judged(file, None, tuple(findings))
-    findings += [*path.findings, *review(path, shared.limits, str(file))]
+    findings += [replace(each, level=Level.INFO) if each.code == _FRAME_STATED else each for each in path.findings]
+    findings += review(path, shared.limits, str(file))
     if shared.reference is None:
         return _Judged(file, path, tuple(findings))
     comparison = compared(

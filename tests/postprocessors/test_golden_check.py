@@ -19,7 +19,6 @@ EXPLAINED = {
     "dxf": {302, 303, 366},  # a drawing has neither feeds nor tool axes, nor ways between its curves
     "dxf-nasty": {302, 303, 366},
     "val3": {860},  # outputs that the operator has not named yet
-    "val3-linked": {317},  # the points stand in the frame of the part
 }
 """Codes of warnings that say what is so on purpose."""
 

@@ -47,12 +47,9 @@ def check_name(defects: Defects, name: str, line: int, *, longest: int, allowed:
         defects.fail(Check.NAMES, f"{name!r} is not allowed as a {noun}", line)
 
 
-def check_declared(
-    defects: Defects, declared: Mapping[str, int], used: Iterable[str], noun: str, *, file: str = ""
-) -> None:
+def check_declared(defects: Defects, declared: Mapping[str, int], used: Iterable[str], noun: str) -> None:
     """Note what is declared, with its line, and never used."""
     known = set(used)
-    where = f" (declared in {file})" if file else ""
     for name, line in declared.items():
         if name not in known:
-            defects.warn(Check.SYMBOLS, f"the {noun} {name} is declared and never used{where}", 0 if file else line)
+            defects.info(Check.SYMBOLS, f"the {noun} {name} is declared and never used", line)
