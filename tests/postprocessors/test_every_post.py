@@ -36,6 +36,13 @@ LINKED = {
     "log_messages": "true",
     "shoulder": "lefty",
 }
+LINKED_S6 = {
+    "dialect": "s6",
+    "spindle_output": "bOut0",
+    "coolant_output": "bOut1",
+    "continue_input": "bIn0",
+    "outputs": "INSERT/X=bOut2:on",
+}
 UNCERTAINTY = np.ma.array(np.arange(6) / 70.0, mask=[True, False, False, False, False, True])
 CASES = {
     "apt": lambda: Apt().write(simple_program()),
@@ -54,11 +61,22 @@ CASES = {
     "val3": lambda: Val3().write(simple_program()),
     "val3-linked": lambda: Val3(LINKED).write(simple_program(T_scan_program=POSE)),
     "val3-nasty": lambda: Val3().write(nasty_program()),
+    "val3-per-move": lambda: Val3({"style": "per-move", "payload": "8.5,0,2,90"}).write(row_program()),
+    "val3-loop": lambda: Val3({"style": "loop", "max_points_per_array": 9}).write(row_program()),
+    "val3-s6": lambda: Val3(LINKED | LINKED_S6).write(simple_program(T_scan_program=POSE)),
+    "val3-s6-loop": lambda: Val3({"dialect": "s6", "style": "loop", "first_run": True}).write(row_program()),
 }
 POSTS = [PathCsv(), GCode(), GCode({"orientation": "rotary"}), GCode({"orientation": "siemens"}), Val3(), Apt()]
 # Lines that hold text of the user: comments, the name of the program, and files named after it.
 TEXT = ("(", ";", "//", "$$", "PPRINT/", "PARTNO/", "<Data file=")
 EACH_POST = pytest.mark.parametrize("post", POSTS, ids=lambda p: f"{p.name}-{getattr(p.options, 'orientation', '')}")
+
+
+def row_program():
+    """Fourteen moves in a row, two of them a retract, with a pause: what loops are made of."""
+    rapid = [move in (7, 8) for move in range(14)]
+    feed = [600.0 if move < 4 else 900.0 for move in range(14)]
+    return straight_program(14, feed=feed, rapid=rapid, spacing=5.0, events=(Event(11, EventKind.DWELL, 0.25),))
 
 
 @pytest.mark.parametrize("case", CASES)

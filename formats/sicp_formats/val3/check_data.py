@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 from sicp_cam.errors import FormatError, printable
@@ -20,6 +21,7 @@ __all__ = ["check_data"]
 _INNER = frozenset({"key", "index", "alias", "privilege", "size", "name", "public"})
 _WORDS = frozenset({"shoulder", "elbow", "wrist", "fatherId", "ioLink", "blend"})
 _ANGLES = ("rx", "ry", "rz")
+_LINKED = re.compile(r"(?:dio|aio)Link\s*\(\s*([A-Za-z_]\w*)", re.ASCII)
 _FULL_TURN = 360.0
 _RADIANS = (math.pi, math.pi / 2.0)
 _FEW_ANGLES = 3
@@ -34,8 +36,8 @@ def check_data(application: Application, report: Report) -> None:
         for key, (line, attributes) in variable.values.items():
             _check_attributes(variable, key, line, attributes, report)
         _check_father(application, variables, variable, report)
-        if variable.type in ("dio", "aio") and not application.old:
-            _check_links(variable, report)
+        if variable.type in ("dio", "aio"):
+            _check_links(variable, report, _linked(application) if application.old else None)
     _check_radians(application, report)
 
 
@@ -162,7 +164,19 @@ def _father_problem(
     return ""
 
 
-def _check_links(variable: Variable, report: Report) -> None:
+def _linked(application: Application) -> set[str]:
+    """Return the variables that the programs link, as those of s6 do."""
+    texts = [statement.text for code in application.programs for statement in code.statements]
+    return {name for text in texts for name in _LINKED.findall(text) if not text.startswith("//")}
+
+
+def _check_links(variable: Variable, report: Report, linked: set[str] | None) -> None:
+    if linked is not None:
+        if variable.name not in linked and not variable.public:
+            told = printable(variable.name, 40)
+            message = f"{told} is linked to no input or output; link it, as by {variable.type}Link({told},io:bOut0)"
+            report.add(860, Level.WARN, message, variable.file, variable.line, kind="none")
+        return
     for key in [str(index) for index in range(variable.size)] if not variable.collection else variable.values:
         line, attributes = variable.values.get(key, (variable.line, {}))
         link = attributes.get("link", "")

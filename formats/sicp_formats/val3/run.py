@@ -29,6 +29,7 @@ _ACTIVE = re.compile(r"\b(?:call|return)\b|\btask[a-z]|move[jlc]\b|\balter[a-z]"
 _HARMLESS_WORDS = """
     aioSet autoConnectMove close cls delay disablePower enablePower gotoxy logMsg open popUpMsg put putln resetMotion
     restartMove setMoveId setPayload sioSet stopMove title userPage wait waitEndMove watch
+    dioLink aioLink sioLink
 """
 _HARMLESS = frozenset(_HARMLESS_WORDS.split())
 _DEEPEST_APPRO = 8
