@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from post_programs import path_of, program_of, straight_program
 
+from sicp_cam.errors import PathError
 from sicp_cam.findings import Level
 from sicp_cam.rigid_motion import from_parts
+from sicp_postprocessors.gcode import GCode
 from sicp_postprocessors.path_checks import PreflightOptions, path_findings, stretches_told
 
 WORLD = np.eye(4)
@@ -144,3 +146,13 @@ def test_short_paths_are_checked_without_stumbling(count):
     program = program_of(path_of(np.zeros((count, 3)), np.tile([0.0, 0, 1], (count, 1)), 600.0))
     findings = checked(program, work_box_mm=(-1, -1, -1, 1, 1, 1), max_feed_mm_min=1000.0)
     assert [f.code for f in findings] == [662] * (count == 2)
+
+
+def test_g_code_takes_the_checks_as_options_of_its_own():
+    post = GCode({"work_box_mm": "0,-1,-1,15,1,1", "max_feed_mm_min": "500"})
+    failed = [f.code for f in post.preflight(straight_program(20)) if f.level is Level.FAIL]
+    assert failed == [660, 661]
+    with pytest.raises(
+        PathError, match=r"moves 16 to 19, lines 26 to 29: the tip leaves the work box by up to 4.000 mm"
+    ):
+        post.write(straight_program(20))

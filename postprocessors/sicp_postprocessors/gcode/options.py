@@ -7,6 +7,7 @@ from typing import Literal
 
 from sicp_cam.errors import JobError
 from sicp_postprocessors.options import outside
+from sicp_postprocessors.path_checks import PreflightOptions
 
 __all__ = ["DIALECTS", "Dialect", "GCodeOptions"]
 
@@ -52,7 +53,7 @@ DIALECTS = {
 
 
 @dataclass(frozen=True, slots=True)
-class GCodeOptions:
+class GCodeOptions(PreflightOptions):
     """Options of the post `gcode`; empty strings take the word of the dialect that `orientation` chooses."""
 
     orientation: Literal["vector", "rotary", "siemens"] = "vector"
