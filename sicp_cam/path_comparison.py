@@ -189,6 +189,7 @@ def _kinds(path: ToolPath, reference: ToolPath, matched: IntArray, file: str) ->
     """Compare which moves are rapid; a robot may run those of a path straight, at a speed that is stated."""
     rapid = path.rapid[matched]
     hasty, slow = rapid & ~reference.rapid, ~rapid & reference.rapid
+    hasty[:1] = False  # the move to the first point comes from nowhere that is known: robots take it joint by joint
     if hasty.any():
         first = int(np.flatnonzero(hasty)[0])
         what = f"{int(hasty.sum())} cuts of the reference are rapid moves here"
