@@ -21,6 +21,9 @@ THIS_POST = "<post>"
 T = TypeVar("T")
 
 _WORDS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+_DATA_FILE = ".toml"
+_LONGEST_FILE_NAME = 4096
+_LONGEST_TEXT = 200
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}", re.ASCII)
 _NUMBER = re.compile(r"[+-]?([0-9]{1,18}(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,3})?", re.ASCII)
 
@@ -161,6 +164,10 @@ def _numbers(value: object, count: int) -> tuple[float, ...]:
 
 
 def _text(value: object) -> str:
-    if isinstance(value, str) and value.isascii() and value.isprintable() and len(value) <= 200:
-        return value
+    if isinstance(value, str) and value.isprintable():
+        # A data file lies in whatever folder the user has; every other text may end up in a program.
+        if value.strip().lower().endswith(_DATA_FILE) and len(value) <= _LONGEST_FILE_NAME:
+            return value
+        if value.isascii() and len(value) <= _LONGEST_TEXT:
+            return value
     raise ValueError("a line of plain text (printable ASCII)")

@@ -86,10 +86,10 @@ geometry = 3
         "world must be shoulder or base_plate",
         "geometry_mm.reach is not known; known are shoulder_height, shoulder_forward, elbow_side, upper_arm, "
         "forearm_offset, forearm, flange",
-        "geometry_mm.shoulder_height must be a finite number",
-        "geometry_mm.shoulder_forward must be a finite number",
+        "geometry_mm.shoulder_height must be a number",
+        "geometry_mm.shoulder_forward must be a number",
         "geometry_mm.upper_arm must be larger than 0",
-        "geometry_mm.forearm must lie within 100000, not 2e+09",
+        "geometry_mm.forearm must lie within 100000",
         "geometry_mm.flange must be given",
         "joint.7 is not known; known are 1, 2, 3, 4, 5, 6",
         "joint.1.lowest_deg must be less than joint.1.highest_deg",
@@ -107,6 +107,8 @@ geometry = 3
     ("text", "problem"),
     [
         ("name = ", "Invalid value (at end of document)"),
+        (GOOD.replace("-170", "9" * 400), "joint.1.lowest_deg must lie within 36000"),
+        (GOOD.replace("-170", "-inf"), "joint.1.lowest_deg must lie within 36000"),
         (GOOD + "[joint.1]", "Cannot declare"),
         (GOOD.partition("[joint.1]")[0] + "joint = 3", "geometry_mm.joint is not known"),
         ("joint = 3\n" + GOOD.partition("[joint.1]")[0], "joint must be a table"),
@@ -132,7 +134,9 @@ def test_a_file_is_read_beside_the_job(tmp_path):
     [
         (None, "cannot be read: No such file"),
         (b"\xff\xfe", "byte 0: it is not UTF-8"),
-        (b"#" * 70_000, "has 70000 bytes"),
+        (b"#" * 70_000, "has more than 65536 bytes"),
+        (b"name = " + b"[" * 60_000, "nested too deeply"),
+        (b"name = " + b"9" * 60_000, "Exceeds the limit"),
         (b'name = "x"\nworld = oops\n', "Invalid value .at line 2"),
     ],
 )

@@ -127,7 +127,9 @@ def test_a_users_own_arm_is_used(tmp_path):
             "flange_mm",
         )
     }
-    file = tmp_path / "arm.toml"
+    folder = tmp_path / "Jörgs Zelle" / ("x" * 200)
+    folder.mkdir(parents=True)
+    file = folder / "arm.toml"
     lines = ['name = "Ours"', 'world = "shoulder"', "[geometry_mm]", *(f"{k} = {v}" for k, v in lengths.items())]
     file.write_text("\n".join([*lines, "[joint.3]", "lowest_deg = 0.0", "highest_deg = 60.0"]), encoding="utf-8")
     findings = told(ASKED | {"robot": str(file)})

@@ -24,7 +24,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Mapping
 from importlib import resources
@@ -72,6 +71,7 @@ def load_arm(robot: str) -> Arm:
     JobError
         If there is none, or with every problem of the file.
     """
+    robot = robot.strip()
     if not robot.lower().endswith(".toml"):
         name = robot.lower()
         if name not in arm_names():
@@ -82,12 +82,13 @@ def load_arm(robot: str) -> Arm:
         content = (resources.files("sicp_postprocessors.arm") / "robots" / f"{name}.toml").read_bytes()
         return arm_from_text(content.decode("utf-8"), f"{name}.toml")
     try:
-        content = Path(robot).read_bytes()
+        with Path(robot).open("rb") as file:
+            content = file.read(_LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "its name is not valid"
         raise JobError(f"robot file {printable(robot)} cannot be read: {reason}") from None
     if len(content) > _LARGEST_FILE:
-        raise JobError(f"robot file {printable(robot)} has {len(content)} bytes; a kinematics file has a few hundred")
+        raise JobError(f"robot file {printable(robot)} has more than {_LARGEST_FILE} bytes; it is no kinematics file")
     try:
         return arm_from_text(content.decode("utf-8-sig"), robot)
     except UnicodeDecodeError as error:
@@ -108,7 +109,9 @@ def arm_from_text(text: str, file: str) -> Arm:
     """
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise JobError(f"robot file {printable(file)}: its values are nested too deeply") from None
+    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
         raise JobError(f"robot file {printable(file)}: {printable(str(error))}") from None
     problems: list[str] = []
     _unknown_keys(table, ("name", "world", "geometry_mm", "joint", "sources"), "", problems)
@@ -186,10 +189,10 @@ def _number(
     if key not in table:
         return default
     value = table[key]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        problems.append(f"{prefix}{key} must be a finite number")
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
+        problems.append(f"{prefix}{key} must be a number")
         return 1.0
-    if abs(value) > largest:
-        problems.append(f"{prefix}{key} must lie within {largest:g}, not {value:g}")
+    if not abs(value) <= largest:
+        problems.append(f"{prefix}{key} must lie within {largest:g}")
         return 1.0
     return float(value)
