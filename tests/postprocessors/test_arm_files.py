@@ -59,6 +59,7 @@ def test_every_problem_of_a_file_is_told_at_once():
 name = "ü"
 world = "floor"
 colour = "red"
+remark = 7
 [geometry_mm]
 shoulder_height = "high"
 shoulder_forward = nan
@@ -81,8 +82,9 @@ lowst_deg = 3
 geometry = 3
 """
     assert problems_of(text) == [
-        "colour is not known; known are name, world, geometry_mm, joint, sources",
+        "colour is not known; known are name, world, remark, geometry_mm, joint, sources",
         "name must be a text of printable ASCII",
+        "remark must be a text of printable ASCII, on one line",
         "world must be shoulder or base_plate",
         "geometry_mm.reach is not known; known are shoulder_height, shoulder_forward, elbow_side, upper_arm, "
         "forearm_offset, forearm, flange",

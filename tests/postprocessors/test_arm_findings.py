@@ -228,7 +228,9 @@ def test_a_built_in_spindle_is_not_checked_but_its_tool_must_lie_on_it():
     joints = moved({6: 0}, {6: 200}, {6: 400})
     findings = findings_of(arm, joints, asked=FORWARD)
     assert not told(findings, 665)
-    assert findings[-1].message.endswith("not checked: joint 6, which is the spindle")
+    assert "not checked: joint 6, which is the spindle; sources differ on joints 3 to 5" in findings[-1].message
+    (limit,) = told(findings_of(arm, moved({3: 129}, {3: 131}), asked=FORWARD), 665)
+    assert limit.message.endswith("give those of your robot in a file")
     tilted = pose_from_six((0.0, 0.0, 150.0, 0.0, 30.0, 0.0))
     (finding,) = told(findings_of(arm, joints, asked=FORWARD, tool=tilted), 666)
     assert finding.level is Level.FAIL

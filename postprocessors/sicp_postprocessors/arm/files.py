@@ -19,7 +19,7 @@
     sign = 1                        # -1 where the controller counts the other way than `Arm`; 1 if left out
     straight_up_deg = 0             # what the controller counts with the arm straight up; 0 if left out
     spindle = false                 # joint 6 only: it is a spindle
-    [sources]                       # where the numbers are from, any keys
+    [sources]                       # where the numbers are from, any keys; and at the top, remark = "what to know"
 """
 
 from __future__ import annotations
@@ -114,10 +114,12 @@ def arm_from_text(text: str, file: str) -> Arm:
     except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
         raise JobError(f"robot file {printable(file)}: {printable(str(error))}") from None
     problems: list[str] = []
-    _unknown_keys(table, ("name", "world", "geometry_mm", "joint", "sources"), "", problems)
-    name, world = table.get("name", ""), table.get("world", "")
-    if not (isinstance(name, str) and name.strip() and name.isascii() and name.isprintable() and len(name) <= 100):
+    _unknown_keys(table, ("name", "world", "remark", "geometry_mm", "joint", "sources"), "", problems)
+    name, world, remark = table.get("name", ""), table.get("world", ""), table.get("remark", "")
+    if not (_is_line(name, 100) and name.strip()):
         problems.append("name must be a text of printable ASCII")
+    if not _is_line(remark, 300):
+        problems.append("remark must be a text of printable ASCII, on one line")
     if world not in _WORLDS:
         problems.append(f"world must be {' or '.join(_WORLDS)}")
     lengths = _lengths(_table(table, "geometry_mm", problems), problems)
@@ -126,7 +128,11 @@ def arm_from_text(text: str, file: str) -> Arm:
     problems += [f"sources.{printable(k)} must be a text" for k, v in sources.items() if not isinstance(v, str)]
     if problems:
         raise JobError(*(f"robot file {printable(file)}: {problem}" for problem in problems))
-    return Arm(str(name), str(world), **lengths, joints=joints, sources=tuple(sources.items()))
+    return Arm(str(name), str(world), **lengths, joints=joints, sources=tuple(sources.items()), remark=remark)
+
+
+def _is_line(text: object, longest: int) -> bool:
+    return isinstance(text, str) and text.isascii() and (not text or text.isprintable()) and len(text) <= longest
 
 
 def _table(table: Mapping[str, Any], key: str, problems: list[str]) -> Mapping[str, Any]:

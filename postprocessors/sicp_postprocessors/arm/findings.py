@@ -126,9 +126,9 @@ def _limit_teller(arm: Arm, places: Places, followed: JointPath, number: int) ->
         low, high = float(least[run].min()), float(most[run].max())
         below = joint.lowest_deg - low > high - joint.highest_deg
         value, limit = (low, joint.lowest_deg) if below else (high, joint.highest_deg)
-        return (
-            f"joint {number + 1} would come to {value:.3f} degrees, its limit is {limit:g} ({followed.configuration})"
-        )
+        more = f"; {arm.remark}" if arm.remark else ""
+        turn = f"joint {number + 1} would come to {value:.3f} degrees, its limit is {limit:g}"
+        return f"{turn} ({followed.configuration}){more}"
 
     return tell
 
@@ -270,6 +270,7 @@ def _summary(arm: Arm, places: Places, choice: Choice) -> Finding:
     margin = choice.followed.margin_deg
     near = f", {margin:.1f} degrees from the nearest joint limit" if choice.good and math.isfinite(margin) else ""
     left = f"; not checked: {', '.join(unknown)}" if unknown else ""
+    left += f"; {arm.remark}" if arm.remark else ""
     message = (
         f"checked with a model of the {arm.name} at {counted(len(places.move), 'place')}, at most "
         f"{places.apart_mm:.3g} mm and {places.apart_deg:.3g} degrees apart, in the configuration "

@@ -72,6 +72,8 @@ class Arm:
         Joints 1 to 6.
     sources
         Where the numbers are from, by subject.
+    remark
+        What the operator should know about the numbers; may be empty.
 
     Notes
     -----
@@ -90,6 +92,7 @@ class Arm:
     flange_mm: float
     joints: tuple[Joint, ...]
     sources: tuple[tuple[str, str], ...] = ()
+    remark: str = ""
 
     @property
     def shoulder_in_world_mm(self) -> float:
