@@ -12,7 +12,7 @@ SYSTEM_PACKAGES := libgl1 libegl1 libx11-6 libxrender1
 PEERS := .peers
 PEER_SYSTEM_PACKAGES := cloudcompare libgl1 libgomp1 libusb-1.0-0
 
-.PHONY: help demo test check lint bench-accuracy bench-peers bench-io peers clean distclean
+.PHONY: help demo test check lint bench-accuracy bench-peers bench-io bench-programs peers clean distclean
 
 help:
 	@echo 'make demo       correct the porthole sample: program, pictures and report in out/porthole'
@@ -22,6 +22,7 @@ help:
 	@echo 'make bench-accuracy  measure every method on every case: docs/accuracy.md and its picture'
 	@echo 'make bench-peers     the same with other libraries beside them, which make peers installs'
 	@echo 'make bench-io   measure how fast scans and programs are read, each against the plainest way'
+	@echo 'make bench-programs  measure how fast programs are written by every postprocessor, and in how much memory'
 	@echo 'make clean      remove what these commands made; distclean removes .venv too'
 
 demo: $(READY)
@@ -45,6 +46,9 @@ bench-peers: $(INSTALLED) peers
 
 bench-io: $(INSTALLED)
 	OMP_NUM_THREADS=1 $(RUN) benchmarks/io.py
+
+bench-programs: $(INSTALLED)
+	OMP_NUM_THREADS=1 $(RUN) benchmarks/programs.py
 
 peers: $(PEERS)/.installed
 

@@ -1,5 +1,6 @@
 """The benchmark's own measure and cases, where the answer is known without the product."""
 
+import dataclasses
 import importlib
 from pathlib import Path
 
@@ -91,3 +92,56 @@ def test_the_names_of_the_peers_are_those_of_their_child(bench_module):
     text = (BENCHMARKS / "peers" / "register.py").read_text(encoding="utf-8")
     assert [peer for peer in bench_module("peer_runs").PEERS if f'"{peer}": (' not in text] == []
     assert text.count('": ("') == len(bench_module("peer_runs").PEERS)
+
+
+# --- programs ---
+
+
+def test_the_path_of_the_programs_is_what_its_text_says(bench_module):
+    programs = bench_module("programs")
+    made = programs.program(4 * programs.ROUND)
+    path = made.path
+    assert len(path) == 4 * programs.ROUND and path.rapid.sum() == 8
+    step = np.linalg.norm(np.diff(path.tips_mm, axis=0), axis=1)[~path.rapid[1:] & ~path.rapid[:-1]]
+    assert step.min() > 0.4 and step.max() < 0.6
+    assert (np.abs(np.diff(path.axes, axis=0)).max(axis=1) > 0.0).mean() > 0.99
+    assert set(path.feeds_mm_min) == {0.0, *programs.FEEDS_MM_MIN}
+    assert {event.kind.value for event in path.events} == {"tool", "spindle", "comment", "coolant"}
+
+
+@pytest.mark.parametrize("post", ["csv", "val3"])
+def test_a_program_of_the_benchmark_is_the_path(bench_module, tmp_path, post):
+    programs = bench_module("programs")
+    writer, made = programs.prepared(post, 300)
+    files = writer.write(made)
+    for name, content in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    again = programs.plugins.read_path(tmp_path / writer.main_file(files), options=writer.reading())
+    assert np.abs(again.tips_mm - made.path.tips_mm).max() < 1e-3
+
+
+def test_a_row_tells_whether_its_limits_are_kept(bench_module):
+    programs = bench_module("programs")
+    row = programs.measured("csv", 600, 1)
+    assert row.moves_per_s == pytest.approx(600 / row.seconds)
+    assert row.limit == 300_000.0 and row.megabytes > 0.03
+    fast = programs.Row("val3", 200_000, 1.0, 200_000.0, 150_000.0, 40.0, 3.0, 12.0)
+    assert fast.kept and programs.told(fast).endswith("memory   3.0 x (limit 12): kept")
+    for change in ({"moves_per_s": 149_999.0}, {"memory": 12.1}):
+        slow = dataclasses.replace(fast, **change)
+        assert not slow.kept and programs.told(slow).endswith("MISSED")
+    assert dataclasses.replace(fast, limit=None, moves_per_s=1.0, memory=None).kept
+
+
+def test_the_program_that_is_written_again_was_read(bench_module):
+    programs = bench_module("programs")
+    writer, made = programs.prepared("same", 40)
+    (content,) = writer.write(made).values()
+    (original,) = programs.plugins.postprocessor("apt").write(programs.program(40)).values()
+    assert content.count(b"GOTO") == original.count(b"GOTO") == 40 and content != original
+
+
+def test_every_limit_is_that_of_a_post(bench_module):
+    programs = bench_module("programs")
+    assert {*programs.LIMITS, *programs.NO_LIMIT} <= set(programs.owners(programs.POSTPROCESSORS))
