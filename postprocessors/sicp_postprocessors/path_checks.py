@@ -29,6 +29,9 @@ _STILL_MM = 1e-6
 _STILL_DEG = 1e-6
 _BACK = np.cos(np.radians(150.0))
 """A step that turns by more than 150 degrees goes back on the one before."""
+_ALONG = np.cos(np.radians(5.0))
+"""A step within 5 degrees of the tool axis plunges or lifts."""
+_FLIP_DEG = 90.001
 _MOST_TOLD = 10
 _AXES = "xyz"
 
@@ -179,7 +182,7 @@ def _turn_findings(path: ToolPath, motion: _Motion, options: PreflightOptions) -
 
 def _motion_findings(path: ToolPath, motion: _Motion) -> list[Finding]:
     """Tell where the axis flips, where the cut goes back on its way, and of moves without motion."""
-    flips = motion.cuts & (motion.turns_deg > 90.0)
+    flips = motion.cuts & (motion.turns_deg > _FLIP_DEG)
     still = motion.cuts & (motion.lengths_mm < _STILL_MM) & (motion.turns_deg < _STILL_DEG)
 
     def tell(run: slice) -> str:
@@ -197,13 +200,14 @@ def _motion_findings(path: ToolPath, motion: _Motion) -> list[Finding]:
 
 
 def _goes_back(path: ToolPath, motion: _Motion) -> BoolArray:
-    """Return where a cutting move goes back on the cutting move before it (n,)."""
+    """Return where a cutting move goes back on the cutting move before it (n,); out of a hole again is no such way."""
     back = np.zeros(len(path), np.bool_)
     steps, lengths = np.diff(path.tips_mm, axis=0), motion.lengths_mm
     cosine = np.einsum("ni,ni->n", steps[1:], steps[:-1])
     sharp = cosine < _BACK * lengths[2:] * lengths[1:-1]
     long = np.minimum(lengths[2:], lengths[1:-1]) > _SHORTEST_STEP_MM
-    back[2:] = motion.cuts[2:] & motion.cuts[1:-1] & long & sharp
+    lifts = np.einsum("ni,ni->n", steps[1:], path.axes[1:-1]) > _ALONG * lengths[2:]
+    back[2:] = motion.cuts[2:] & motion.cuts[1:-1] & long & sharp & ~lifts
     return back
 
 

@@ -111,6 +111,11 @@ def test_a_cut_that_goes_back_on_its_way_is_told(degrees, warned):
     assert [(f.code, f.where) for f in findings] == [(662, "move 2, line 12")] * warned
 
 
+def test_out_of_a_hole_again_is_no_way_back():
+    tips = [[0, 0, 5], [0, 0, -5], [0, 0, 5], [10, 0, 5]]
+    assert checked(program_of(path_of(tips, [[0, 0, 1]] * 4, 600.0))) == []
+
+
 def test_noise_is_no_way_back():
     tips = [[0, 0, 0], [10, 0, 0], [9.995, 0, 0], [20, 0, 0]]
     assert checked(program_of(path_of(tips, [[0, 0, 1]] * 4, 600.0))) == []

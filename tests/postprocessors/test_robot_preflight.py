@@ -2,11 +2,13 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from post_programs import path_of, program_of
 
+from sicp_cam import pipeline
 from sicp_cam.errors import JobError, PathError
 from sicp_cam.findings import Level
 from sicp_postprocessors.arm import arm_names, load_arm
@@ -91,6 +93,14 @@ def test_nothing_that_depends_on_its_place_is_judged_before_the_part_is_found():
     options = {"robot": "tx2-60", "work_box_mm": "0,0,0,1,1,1"}
     assert told(options, codes=[660, 664])
     assert told(options, replace(loop(), placed=False)) == []
+
+
+def test_a_job_is_not_refused_for_where_its_nominal_path_would_lie():
+    options = KNOWN | {"work_box_mm": "0,0,0,1,1,1"}
+    job = SimpleNamespace(name="loop", post=("val3",), post_options={"val3": options})
+    pipeline._check_posts(job, loop().path)
+    with pytest.raises(PathError, match="feed 0"):
+        pipeline._check_posts(job, replace(loop().path, feeds_mm_min=np.zeros(60)))
 
 
 def test_the_work_box_stands_in_the_robot_s_world():
