@@ -53,8 +53,14 @@ class _Cuts:
         first, last = np.searchsorted(self.cut, cut), np.searchsorted(self.cut, cut, side="right") - 1
         held = np.clip(s_mm, self.s_mm[first], self.s_mm[last + 1])
         row = np.clip(np.searchsorted(self.s_mm, held, side="right") - 1, first, last)
-        t = (held - self.s_mm[row]) / (self.s_mm[row + 1] - self.s_mm[row])
-        return self.begin_mm[row] + t[..., None] * (self.end_mm[row] - self.begin_mm[row]), row
+        return self.on(row, held), row
+
+    def on(self, row: IntArray, s_mm: FloatArray) -> FloatArray:
+        """Return points (..., 3) at arc lengths on known moves."""
+        t = (s_mm - self.s_mm[row]) / (self.s_mm[row + 1] - self.s_mm[row])
+        begin = self.begin_mm[row]
+        points: FloatArray = begin + t[..., None] * (self.end_mm[row] - begin)
+        return points
 
     def vertex(self, s_mm: FloatArray, row: IntArray) -> FloatArray:
         """Return the nearer end (k, 3) of the moves at arc lengths."""
@@ -86,8 +92,7 @@ def crossings(tips_mm: FloatArray, axes: FloatArray, rapid: BoolArray) -> list[C
     step = max(total / _MOST_SAMPLES, _SHORTEST_STEP_MM)
     s = np.arange(0.0, total, step)
     row = np.clip(np.searchsorted(cuts.s_mm, s, side="right") - 1, 0, len(cuts.move) - 1)
-    points, _ = cuts.at(s, cuts.cut[row])
-    pairs = _near_pairs(points, s, cuts.cut[row], step)
+    pairs = _near_pairs(cuts.on(row, s), s, cuts.cut[row], step)
     if not len(pairs):
         return []
     i, j = pairs.T
