@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import BoolArray, FloatArray, Program, ToolPath
@@ -124,13 +125,13 @@ class FanucLs(ControllerPostprocessor):
         """Return straight moves with speed and termination."""
         values, in_mm_s = self._speeds(moves.feeds_mm_min)
         units = np.where(in_mm_s, b"mm/sec", b"cm/min")
-        return rows("L P[{:d}] {:d}{} {}    ;", moves.targets[:, 0], values, units, words(self._endings(moves)))
+        return rows("L P[{:d}] {:d}{} {}    ;", moves.targets[:, 0], values, units, self._endings(moves.zones_mm))
 
-    def _endings(self, moves: Moves) -> list[str]:
-        options, zones = self.options, moves.zones_mm.tolist()
-        if options.rounding == "CNT":
-            return [f"CNT{options.cnt}" if zone > 0.0 else "FINE" for zone in zones]
-        return [f"CD{int(zone)}" if zone >= 1.0 else "FINE" for zone in zones]
+    def _endings(self, zones_mm: FloatArray) -> npt.NDArray[np.bytes_]:
+        if self.options.rounding == "CNT":
+            return words(["FINE", f"CNT{self.options.cnt}"])[(zones_mm > 0.0).astype(np.int64)]
+        whole, place = np.unique(zones_mm.astype(np.int64), return_inverse=True)
+        return words([f"CD{zone}" if zone else "FINE" for zone in whole.tolist()])[place]
 
     def _speeds(self, feeds_mm_min: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return whole numbers (n,), and where they are in mm/sec and not in cm/min; never faster than the feed."""
@@ -182,20 +183,25 @@ class FanucLs(ControllerPostprocessor):
         positions = [self._position_texts(path.tips_mm[s], targets[s], self.options.uframe) for s in stretches]
         calls = [f"  CALL {part}    ;" for part in names] or bodies[0]
         main = [*self.opening(program), *calls, *self.closing(program)]
-        files = {name: (main, [*self._frame_positions(program), *([] if names else positions[0])])}
+        files = {name: (main, self._frame_positions(program) + (b"" if names else positions[0]))}
         for part, body, points in zip(names, bodies, positions, strict=False):
             files[part] = ([*self.frame(program), *body], points)
-        return {f"{each}.ls": self.encoded(_listing(each, *content)) for each, content in files.items()}
+        return {f"{each}.ls": self._listing(each, *content) for each, content in files.items()}
 
-    def _frame_positions(self, program: Program) -> list[str]:
+    def _listing(self, name: str, lines: Sequence[str], positions: bytes) -> bytes:
+        numbered = [f"{number:4}:{line}" for number, line in enumerate(lines, 1)]
+        return self.encoded([*_head(name, len(numbered)), *numbered, "/POS"]) + positions + self.encoded(["/END"])
+
+    def _frame_positions(self, program: Program) -> bytes:
         """Return the positions P[1] and P[2] that hold the frames which the program sets."""
         if self.options.frame_register is None:
-            return []
+            return b""
         poses = np.stack([self.pose_in_world(program), self.tool_in_flange()])
         targets = np.column_stack([np.arange(1, len(_FRAMES) + 1), _wpr(poses[:, :3, :3])])
         return self._position_texts(poses[:, :3, 3], targets, 0)
 
-    def _position_texts(self, tips_mm: FloatArray, targets: FloatArray, uframe: int) -> list[str]:
+    def _position_texts(self, tips_mm: FloatArray, targets: FloatArray, uframe: int) -> bytes:
+        """Return entries of /POS, which hold nothing but numbers and are not looked through again."""
         options, d, a = self.options, self.options.decimals, self.options.angle_decimals
         template = (
             f"P[{{:d}}]{{{{\n   GP1:\n    UF : {uframe}, UT : {options.utool},        "
@@ -203,7 +209,8 @@ class FanucLs(ControllerPostprocessor):
             f"    X = {{:.{d}}}  mm,    Y = {{:.{d}}}  mm,    Z = {{:.{d}}}  mm,\n"
             f"    W = {{:.{a}}} deg,    P = {{:.{a}}} deg,    R = {{:.{a}}} deg\n}}}};"
         )
-        return "\n".join(rows(template, targets[:, 0], *tips_mm.T, *targets.T[1:])).split("\n")
+        text = "\n".join([*rows(template, targets[:, 0], *tips_mm.T, *targets.T[1:]), ""])
+        return text.replace("\n", self.line_end).encode("ascii")
 
     # --- what is told ---
 
@@ -255,9 +262,8 @@ def _frame_values(pose: FloatArray) -> str:
     return " ".join(f"{name}={trimmed(value, 4)}" for name, value in values)
 
 
-def _listing(name: str, lines: Sequence[str], positions: Sequence[str]) -> list[str]:
-    """Return a listing: head, numbered statements, positions."""
-    numbered = [f"{number:4}:{line}" for number, line in enumerate(lines, 1)]
+def _head(name: str, lines: int) -> list[str]:
+    """Return what stands before the numbered statements of a listing."""
     return [
         f"/PROG  {name}",
         "/ATTR",
@@ -266,7 +272,7 @@ def _listing(name: str, lines: Sequence[str], positions: Sequence[str]) -> list[
         "PROG_SIZE   = 0;",
         "FILE_NAME   = ;",
         "VERSION     = 0;",
-        f"LINE_COUNT  = {len(numbered)};",
+        f"LINE_COUNT  = {lines};",
         "MEMORY_SIZE = 0;",
         "PROTECT     = READ_WRITE;",
         "TCD:  STACK_SIZE    = 0,",
@@ -279,8 +285,4 @@ def _listing(name: str, lines: Sequence[str], positions: Sequence[str]) -> list[
         "CONTROL_CODE    = 00000000 00000000;",
         "/APPL",
         "/MN",
-        *numbered,
-        "/POS",
-        *positions,
-        "/END",
     ]

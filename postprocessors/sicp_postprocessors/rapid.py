@@ -10,8 +10,10 @@ pose of the program frame in the scan frame as object frame, so that the operato
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from sicp_cam.model import BoolArray, FloatArray, IntArray, Program, ToolPath
 from sicp_cam.rigid_motion import from_parts
@@ -25,6 +27,8 @@ from sicp_postprocessors.rows import rows, words
 from sicp_postprocessors.text import ascii_line
 
 __all__ = ["Rapid", "RapidOptions"]
+
+Names: TypeAlias = npt.NDArray[np.bytes_]
 
 _NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 _NO_LOAD = "[0.001,[0,0,0.001],[1,0,0,0],0,0,0]"
@@ -112,22 +116,28 @@ class Rapid(ControllerPostprocessor):
         d, q = self.options.decimals, self.options.quaternion_decimals
         position, turn = ",".join([f"{{:.{d}}}"] * 3), ",".join([f"{{:.{q}}}"] * 4)
         target = f"[[{position}],[{turn}],{configuration},{_NO_AXES}]"
-        zones, tools = (column.astype(np.int64).tolist() for column in (moves.targets[:, 5], moves.tools))
         names = (
-            words(self._speed_names(moves, rapid)),
-            words([f"zCut{number}" if number >= 0 else "fine" for number in zones]),
-            words([self._tool_name(number) for number in tools]),
+            self._speed_names(moves, rapid),
+            _named(
+                [f"zCut{number}" for number in range(1 + _largest(moves.targets[:, 5]))], moves.targets[:, 5], "fine"
+            ),
+            self._tool_names(moves),
         )
         template = f"{word} {target},{{}},{{}},{{}}\\WObj:={self.frame_words()};"
         return rows(template, *moves.tips_mm.T, *moves.targets.T[:4], *names)
 
-    def _speed_names(self, moves: Moves, rapid: str) -> list[str]:
+    def _speed_names(self, moves: Moves, rapid: str) -> Names:
         """Return the speed of each move: the name of one that is declared, or written out where there are too many."""
-        numbers = moves.targets[:, 4].astype(np.int64).tolist()
-        if max(numbers, default=-1) < _MOST_SPEEDS:
-            return [f"vCut{number}" if number >= 0 else rapid for number in numbers]
+        count = 1 + _largest(moves.targets[:, 4])
+        if count <= _MOST_SPEEDS:
+            return _named([f"vCut{number}" for number in range(count)], moves.targets[:, 4], rapid)
         feeds = (moves.feeds_mm_min / 60.0).tolist()
-        return [self._speed(feed) if number >= 0 else rapid for number, feed in zip(numbers, feeds, strict=True)]
+        cuts = zip(moves.targets[:, 4].tolist(), feeds, strict=True)
+        return words([self._speed(feed) if number >= 0 else rapid for number, feed in cuts])
+
+    def _tool_names(self, moves: Moves) -> Names:
+        numbers, place = np.unique(moves.tools, return_inverse=True)
+        return words([self._tool_name(number) for number in numbers.tolist()])[place]
 
     # --- data ---
 
@@ -204,6 +214,15 @@ class Rapid(ControllerPostprocessor):
         for routine, body in routines.items():
             lines += [f"  PROC {routine}()", *(f"    {line}" for line in body), "  ENDPROC"]
         return self.encoded([*lines, "ENDMODULE"])
+
+
+def _largest(numbers: FloatArray) -> int:
+    return int(numbers.max(initial=-1))
+
+
+def _named(names: list[str], numbers: FloatArray, other: str) -> Names:
+    """Return the names of numbers (n,), and another one for -1."""
+    return words([other, *names])[numbers.astype(np.int64) + 1]
 
 
 def _pose(pose: FloatArray) -> str:

