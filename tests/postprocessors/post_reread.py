@@ -50,7 +50,7 @@ def read_gcode(files, head="AC"):
         line = re.sub(r"\([^()]*\)|;.*", lambda c: result.actions.append(("comment", c[0])) or "", raw).strip()
         assert "(" not in line and ")" not in line
         line = re.sub(r"^N[0-9]+ ", "", line)
-        if line in ("", "%", "TRAORI", "TRAFOOF"):
+        if line in ("", "%", "TRAORI", "TRAFOOF", "ORIWKS ORIVECT"):
             result.actions += [("mode", line)] if line not in ("", "%") else []
             continue
         words = WORD.findall(line.replace("G43.", "G43"))

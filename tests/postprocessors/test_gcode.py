@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from post_programs import leaning_axes, path_of, program_of, simple_program, straight_program
@@ -7,7 +9,7 @@ from sicp_cam.errors import JobError, PathError
 from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind
 from sicp_postprocessors.gcode import GCode
-from sicp_postprocessors.rotary import axes_from_angles, axis_errors_deg, head_angles
+from sicp_postprocessors.gcode.along import angles_along
 
 DIALECTS = [
     {},
@@ -77,7 +79,9 @@ def test_feed_stands_where_it_changes_and_after_rapid_moves():
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        ({}, "G4 P0.250"),
+        ({}, "G4 X0.250"),
+        ({"dialect": "haas"}, "G4 P0.250"),
+        ({"dialect": "linuxcnc"}, "G4 P0.250"),
         ({"dwell": "X"}, "G4 X0.250"),
         ({"dwell": "P_MS"}, "G4 P250"),
         ({"orientation": "siemens"}, "G4 F0.250"),
@@ -170,45 +174,6 @@ def test_flags_carry_the_name_of_the_post():
 
 
 class TestRotary:
-    def test_known_angles(self):
-        axes = np.array([[0.0, -0.5, np.sqrt(0.75)], [0.5, 0.0, np.sqrt(0.75)]])
-        ac, bc = head_angles(axes, "AC", 0.0), head_angles(axes, "BC", 0.0)
-        assert np.allclose(ac.tilt_deg, 30) and np.allclose(ac.turn_deg, [0, 90])
-        assert np.allclose(bc.tilt_deg, 30) and np.allclose(bc.turn_deg, [-90, 0])
-
-    @pytest.mark.parametrize("kinematics", ["AC", "BC"])
-    def test_forward_of_inverse(self, kinematics):
-        axes = np.random.default_rng(1).normal(size=(2000, 3))
-        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-        angles = head_angles(axes, kinematics, 0.0)
-        assert axis_errors_deg(axes, axes_from_angles(angles.tilt_deg, angles.turn_deg, kinematics)).max() < 1e-9
-
-    def test_turns_run_on_through_half_a_turn(self):
-        angles = head_angles(leaning_axes(200, turn=6 * np.pi), "BC", 1e-3)
-        assert np.abs(np.diff(angles.turn_deg)).max() < 6.0
-        assert np.isclose(angles.turn_deg[-1] - angles.turn_deg[0], 1080.0)
-
-    def test_through_the_pole_the_head_tilts_on_without_turning(self):
-        lean = np.radians(np.linspace(20, -20, 41))
-        axes = np.column_stack([np.sin(lean), np.zeros(41), np.cos(lean)])
-        angles = head_angles(axes, "BC", 1e-3)
-        assert np.allclose(angles.turn_deg, 0.0) and np.allclose(angles.tilt_deg, np.degrees(lean))
-        assert angles.held.sum() == 1
-
-    def test_moves_at_the_pole_take_the_turn_that_follows(self):
-        axes = np.vstack([[[0.0, 0.0, 1.0]] * 3, leaning_axes(2, turn=0.0)])
-        assert np.allclose(head_angles(axes, "AC", 1e-3).turn_deg, 90.0)
-
-    @pytest.mark.parametrize("lean", [-1e-9, 0.0, 1e-9])
-    @pytest.mark.parametrize("kinematics", ["AC", "BC"])
-    @pytest.mark.parametrize("sign", [1.0, -1.0])
-    def test_an_axis_that_turns_round_between_the_poles_is_followed(self, kinematics, lean, sign):
-        axes = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [lean, 0.0, 1.0], [0.0, 1.0, 0.0], [lean, lean, -1.0]])
-        axes[1:, 2] *= sign
-        angles = head_angles(axes, kinematics, 1e-3)
-        assert axis_errors_deg(axes, axes_from_angles(angles.tilt_deg, angles.turn_deg, kinematics)).max() < 1e-3
-        assert np.abs(angles.tilt_deg).max() <= 180.0
-
     def test_hold_is_told_with_its_error(self):
         axes = leaning_axes(5, lean=1e-4, turn=3.0)
         post = GCode({"orientation": "rotary", "singular_cone_deg": 0.01})
@@ -222,7 +187,7 @@ class TestRotary:
         post = GCode({"orientation": "rotary", "tilt_limits_deg": "-10,10"})
         with pytest.raises(PathError, match="moves 0 to 5, lines 10 to 15: A leaves its travel -10 to 10"):
             post.write(simple_program())
-        turning = GCode({"orientation": "rotary", "turn_limits_deg": "-360,120"})
+        turning = GCode({"orientation": "rotary", "turn_limits_deg": "-20,20"})
         with pytest.raises(PathError, match="C leaves its travel"):
             turning.write(simple_program())
 
@@ -233,10 +198,10 @@ class TestRotary:
         assert [f.where for f in told] == ["moves 1 to 3, lines 11 to 13"] and told[0].level is Level.WARN
 
     def test_words_that_miss_the_axis_are_stopped(self, monkeypatch):
-        monkeypatch.setattr("sicp_postprocessors.gcode.post.head_angles", lambda *a: _off(head_angles(*a)))
-        with pytest.raises(PathError, match="move 0, line 10: the rotary words miss the tool axis"):
+        monkeypatch.setattr("sicp_postprocessors.gcode.positions.angles_along", lambda *a: _off(angles_along(*a)))
+        with pytest.raises(PathError, match="move 0, line 10: the words miss the tool axis"):
             GCode({"orientation": "rotary"}).write(simple_program())
 
 
 def _off(angles):
-    return type(angles)(angles.tilt_deg + 0.001, angles.turn_deg, angles.held)
+    return dataclasses.replace(angles, deg=angles.deg + np.array([0.0, 0.001]))

@@ -55,7 +55,9 @@ def test_poses_read_back(reader, poses, feed):
     assert np.abs(np.array(result.tips) - tips).max() < 1e-3
     assert axis_error_deg(np.array(result.axes), axes) < 1e-3
     assert result.rapid == rapid.tolist()
-    assert np.allclose(np.array(result.feeds)[1:], feed, rtol=0, atol=1e-3)
+    # Where the tip stays, controls read a feed as that of the rotary axes: it is not that of the path then.
+    moves = np.abs(np.diff(tips, axis=0)).max(axis=1) > 1e-3
+    assert np.allclose(np.array(result.feeds)[1:][moves], feed, rtol=0, atol=1e-3)
 
 
 @settings(deadline=None, max_examples=60)

@@ -1,120 +1,134 @@
-"""Options of the G-code post, and what the three dialects differ in."""
+"""Options of the G-code post."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from sicp_cam.errors import JobError
-from sicp_postprocessors.options import outside
+from sicp_cam.ranges import Between
+from sicp_postprocessors.gcode.dialects import DIALECTS, Dialect
+from sicp_postprocessors.gcode.machine import Machine
+from sicp_postprocessors.gcode.machines import load_machine
 from sicp_postprocessors.path_checks import PreflightOptions
 
-__all__ = ["DIALECTS", "Dialect", "GCodeOptions"]
+__all__ = ["GCodeOptions"]
 
-
-@dataclass(frozen=True, slots=True)
-class Dialect:
-    """Words that a family of controls expects; `{tool}` in `tcp_on` is the H word of the tool, or nothing."""
-
-    family: str
-    orientation: str
-    tcp_on: str
-    tcp_off: str
-    metric: str
-    inch: str
-    comment: str
-    dwell: str
-    percent: bool
-
-
-_PARENTHESES, _SEMICOLON = "({})", "; {}"
-_VECTOR = "points from the tip to the holder"
-DIALECTS = {
-    "vector": Dialect(
-        "Fanuc G43.5 type 2", f"I J K {_VECTOR}", "G43.5{tool}", "G49", "G21", "G20", _PARENTHESES, "P", True
-    ),
-    # LinuxCNC knows neither G43.4 nor G43.5; there tcp_on is M428 and tcp_off M429 by convention.
-    "rotary": Dialect(
-        "Fanuc G43.4 type 1",
-        "rotary words {kinematics}, head-head",
-        "G43.4{tool}",
-        "G49",
-        "G21",
-        "G20",
-        _PARENTHESES,
-        "P",
-        True,
-    ),
-    # G710 and G700 are Siemens' own metric and inch, feeds included; comments there begin with a semicolon.
-    "siemens": Dialect(
-        "Siemens 840D TRAORI", f"A3 B3 C3 {_VECTOR}", "TRAORI", "TRAFOOF", "G710", "G700", _SEMICOLON, "F", False
-    ),
-}
+_PLAIN_STEP_DEG = 3.0
+_NUMBER = Between(1, 99_999_999)
 
 
 @dataclass(frozen=True, slots=True)
 class GCodeOptions(PreflightOptions):
-    """Options of the post `gcode`; empty strings take the word of the dialect that `orientation` chooses."""
+    """Options of the post `gcode`; empty strings take the words of the dialect."""
 
-    orientation: Literal["vector", "rotary", "siemens"] = "vector"
-    """I J K tool vector under G43.5; A C or B C rotary words under G43.4; or A3= B3= C3= under TRAORI."""
-    kinematics: Literal["AC", "BC"] = "AC"
-    """Head with both rotary axes, C carrying A or B; for `rotary` only. Tables turn the other way: not covered."""
+    dialect: Literal["", "fanuc", "siemens", "heidenhain", "haas", "linuxcnc", "plain"] = ""
+    """Fanuc G43.4, G43.5, Siemens TRAORI, Heidenhain M128, Haas G234, LinuxCNC; plain: no tip control; empty: fanuc."""
+    orientation: Literal["", "vector", "rotary", "siemens"] = ""
+    """How the tool axis is stated: as a vector, or as two rotary angles; empty: as is usual; siemens: its vector."""
+    kinematics: Literal["AC", "BC", "AB"] = "AC"
+    """Head with both rotary axes, the second letter carrying the first; `machine` names any other."""
+    machine: str = ""
+    """Machine of the rotary words, such as table-ac or nutating-head-bc, or FILE.toml; empty: that of `kinematics`."""
     units: Literal["mm", "inch"] = "mm"
     """Unit of positions, and of feeds per minute."""
     tcp_on: str = ""
-    """Words that switch tool tip control on; `{tool}` becomes the H word of the tool."""
+    """Words that switch tool tip control on, such as M428; `{tool}` becomes the H word of the tool."""
     tcp_off: str = ""
     """Words that switch tool tip control off: before a tool change and at the end."""
+    tip_control: Literal["", "on", "off"] = ""
+    """Off: X Y Z are written as the machine must move them, which needs its geometry; empty: as the dialect has it."""
+    tool_length_mm: Annotated[float | None, Between(0.0, 10_000.0)] = None
+    """Length of the tool from the gauge point, for axes in the head without tip control and for linear travel."""
+    part_zero_mm: tuple[float, float, float] | None = None
+    """Origin of the program in the machine frame, for tables without tip control and for linear travel."""
+    inverse_time: bool = False
+    """Write G93 feeds, one over the minutes that a move takes; always so without tip control."""
+    rotary_feed_deg_min: Annotated[float, Between(0.1, 1e6)] = 360.0
+    """Feed of cutting moves on which the tool only turns."""
+    max_axis_step_deg: Annotated[float | None, Between(0.01, 180.0)] = None
+    """Divide cutting moves on which an axis turns further; none: 3 without tip control, or else none is divided."""
+    tip_tolerance_mm: Annotated[float, Between(0.0001, 10.0)] = 0.01
+    """How far the tip may leave its straight way in a block without tip control; longer ones are divided."""
+    path_tolerance_mm: Annotated[float, Between(0.0001, 10.0)] = 0.01
+    """How far LinuxCNC may round corners (G64 P)."""
     work_offset: str = ""
     """Word of the work offset, such as G54; without it the program runs in whatever offset is active."""
-    program_number: int | None = None
-    """Number of the O word; none if left out."""
-    tool: int = 0
+    program_number: Annotated[int | None, _NUMBER] = None
+    """Number of the O word; none if left out, and 1 for Haas."""
+    tool: Annotated[int, Between(0, 99_999_999)] = 0
     """Tool in the spindle at the start, for its H word, where the path does not say it; 0 writes no H word."""
-    line_numbers: int = 0
-    """Step of the N words; 0 writes none."""
-    decimals: int | None = None
+    line_numbers: Annotated[int, Between(0, 100)] = 0
+    """Step of the block numbers; 0 writes none, but for Heidenhain, which counts each line."""
+    decimals: Annotated[int | None, Between(3, 7)] = None
     """Decimals of positions: by default 4 in mm and 6 in inch."""
-    vector_decimals: int = 6
-    """Decimals of tool vectors."""
-    angle_decimals: int = 4
+    vector_decimals: Annotated[int | None, Between(5, 9)] = None
+    """Decimals of tool vectors: by default 6, for Heidenhain 7."""
+    angle_decimals: Annotated[int, Between(3, 7)] = 4
     """Decimals of rotary words, in degrees."""
     dwell: Literal["", "P", "X", "P_MS", "F"] = ""
     """Word of the dwell time: P or X or F in seconds, P_MS in whole milliseconds."""
-    singular_cone_deg: float = 0.0005
-    """Nearer than this to the pole of the rotary axes C is held; the axis is then wrong by at most this angle."""
-    rotary_step_deg: float = 30.0
+    singular_cone_deg: Annotated[float, Between(0.0, 5.0)] = 0.0005
+    """Nearer than this to the pole the axis next to the part is held; the tool axis is then wrong by this at most."""
+    rotary_step_deg: Annotated[float, Between(0.01, 360.0)] = 30.0
     """A rotary axis that turns further than this in one cutting move is worth a warning."""
-    tilt_limits_deg: tuple[float, float] = (-180.0, 180.0)
-    """Travel of A or B."""
-    turn_limits_deg: tuple[float, float] = (-36000.0, 36000.0)
-    """Travel of C, which is written unwrapped."""
+    tilt_limits_deg: tuple[float, float] | None = None
+    """Travel of the rotary axis next to the tool, A or B; none: that of the machine, -180 to 180."""
+    turn_limits_deg: tuple[float, float] | None = None
+    """Travel of the rotary axis next to the part, mostly C; none: that of the machine, through full turns."""
+    wrap: Literal["", "none", "0..360", "+-180"] = ""
+    """How angles of axes that turn round are written: through full turns, or within one; empty: as the machine does."""
+    max_moves_per_program: Annotated[int | None, Between(10, 10_000_000)] = None
+    """Divide longer paths into subprograms, at rapid moves; none: one program."""
+    split_cuts: bool = False
+    """Divide cuts that are longer than `max_moves_per_program` too."""
 
     def __post_init__(self) -> None:
-        problems = [
-            *outside("program_number", 1 if self.program_number is None else self.program_number, 1, 99_999_999),
-            *outside("tool", self.tool, 0, 99_999_999),
-            *outside("line_numbers", self.line_numbers, 0, 100),
-            *outside("decimals", self.position_decimals, 3, 7),
-            *outside("vector_decimals", self.vector_decimals, 5, 9),
-            *outside("angle_decimals", self.angle_decimals, 3, 7),
-            *outside("singular_cone_deg", self.singular_cone_deg, 0.0, 5.0),
-            *outside("rotary_step_deg", self.rotary_step_deg, 0.01, 360.0),
-        ]
-        problems += [
-            f"option {name!r} must be words of the control, without ( ) % ; /"
-            for name in ("tcp_on", "tcp_off", "work_offset")
-            if set("()%;/") & set(getattr(self, name))
-        ]
+        problems = self._word_problems()
         for name in ("tilt_limits_deg", "turn_limits_deg"):
-            low, high = getattr(self, name)
-            if not low < high:
+            limits = getattr(self, name)
+            if limits is not None and not limits[0] < limits[1]:
+                low, high = limits
                 problems.append(f"option {name!r} must be a lower and a higher angle, not {low:g}, {high:g}")
-        if self.program_number is not None and not self.dialect.percent:
-            problems.append(f"option 'program_number' has no meaning for orientation {self.orientation}")
+        if self.orientation == "siemens" and self.dialect not in ("", "siemens"):
+            problems.append(f"option 'orientation' siemens is not one of dialect {self.dialect}; set vector or rotary")
+        elif self.words not in self.control.orientations:
+            known = " or ".join(self.control.orientations)
+            problems.append(f"option 'orientation' must be {known} for dialect {self.dialect or 'fanuc'}")
+        else:
+            problems += self._meaning_problems()
         if problems:
             raise JobError(*problems)
+
+    @property
+    def control(self) -> Dialect:
+        """Words of the chosen dialect, before the options that replace some of them."""
+        named = self.dialect or ("siemens" if self.orientation == "siemens" else "fanuc")
+        return DIALECTS[named]
+
+    @property
+    def words(self) -> str:
+        """How the tool axis is stated: "vector" or "rotary"."""
+        if self.orientation == "siemens":
+            return "vector"
+        return self.orientation or next(iter(self.control.orientations))
+
+    @property
+    def knows_tip(self) -> bool:
+        """Say whether the control keeps the tip on the path while the axes turn."""
+        return self.control.tip_control if not self.tip_control else self.tip_control == "on"
+
+    @property
+    def states_time(self) -> bool:
+        """Say whether feeds are written as inverse time."""
+        return self.inverse_time or not self.knows_tip
+
+    @property
+    def axis_step_deg(self) -> float | None:
+        """Largest turn in one cutting block; None where no move is divided."""
+        if self.max_axis_step_deg is None and not self.knows_tip:
+            return _PLAIN_STEP_DEG
+        return self.max_axis_step_deg
 
     @property
     def position_decimals(self) -> int:
@@ -124,14 +138,75 @@ class GCodeOptions(PreflightOptions):
         return 4 if self.units == "mm" else 6
 
     @property
-    def control(self) -> str:
-        """Family of controls and meaning of the orientation words, for the head of the program."""
-        words = self.dialect.orientation.format(kinematics=self.kinematics)
-        if self.tcp_on:
-            return f"tool tip control {' '.join(self.tcp_on.replace('{tool}', '').split())}: {words}"
-        return f"{self.dialect.family}: {words}"
+    def axis_decimals(self) -> int:
+        """Decimals of tool vectors."""
+        return self.control.vector_decimals if self.vector_decimals is None else self.vector_decimals
 
     @property
-    def dialect(self) -> Dialect:
-        """Words of the chosen dialect, before the options that replace some of them."""
-        return DIALECTS[self.orientation]
+    def number(self) -> int | None:
+        """Number of the program, None where it has none."""
+        return self.control.smallest_number if self.program_number is None else self.program_number
+
+    def rotaries(self) -> Machine:
+        """Return the machine of the rotary words.
+
+        Raises
+        ------
+        JobError
+            If it is not known, or with every problem of its file.
+        """
+        named = self.machine or f"head-{self.kinematics.lower()}"
+        return load_machine(named).limited(self.turn_limits_deg, self.tilt_limits_deg, self.wrap)
+
+    def described(self, machine: Machine) -> str:
+        """Return family of controls and meaning of the orientation words, for the head of the program."""
+        control = self.control
+        words = control.orientations[self.words].format(machine=f"{machine.letters}, {machine.kind}")
+        if not self.knows_tip:
+            return f"{control.family}: {words}, X Y Z for the geometry of {machine.name}"
+        if self.tcp_on:
+            return f"tool tip control {' '.join(self.tcp_on.replace('{tool}', '').split())}: {words}"
+        kinds = {"G43.5": "Fanuc G43.5 type 2", "G43.4": "Fanuc G43.4 type 1"}
+        first = control.tip_on[self.words][0].replace("{tool}", "")
+        return f"{kinds.get(first, control.family)}: {words}"
+
+    def _word_problems(self) -> list[str]:
+        return [
+            f"option {name!r} must be words of the control, without ( ) % ; /"
+            for name in ("tcp_on", "tcp_off", "work_offset")
+            if set("()%;/") & set(getattr(self, name))
+        ]
+
+    def _meaning_problems(self) -> list[str]:
+        """Return the problems that only options together have."""
+        control, told = self.control, []
+        if self.program_number is not None and not control.number:
+            told.append(f"option 'program_number' has no meaning for dialect {self.dialect or self.orientation}")
+        if self.units == "inch" and control.inch is None:
+            told.append(f"option 'units' must be mm for dialect {self.dialect}: its controls differ in feeds in inches")
+        if self.states_time and control.largest_inverse is None:
+            told.append(f"option 'inverse_time' has no meaning for dialect {self.dialect}, which knows tip control")
+        if self.max_moves_per_program and control.subprograms and control.subprograms.numbered and not self.number:
+            told.append("option 'max_moves_per_program' needs 'program_number', from which subprograms are counted")
+        if self.words == "vector":
+            if not self.knows_tip:
+                told.append("option 'tip_control' off needs orientation rotary: the machine moves two rotary axes")
+            return told
+        try:
+            machine = self.rotaries()
+        except JobError as error:
+            return told + list(error.problems)
+        return told + ([] if self.knows_tip else self._geometry_problems(machine))
+
+    def _geometry_problems(self, machine: Machine) -> list[str]:
+        told = []
+        if not machine.has_geometry:
+            told.append(
+                "without tip control X Y Z depend on where the rotary axes stand: name a machine FILE.toml with "
+                f"point_mm or pivot_mm by option 'machine'; {machine.name} has none"
+            )
+        if machine.kind != "table-table" and self.tool_length_mm is None:
+            told.append("option 'tool_length_mm' is needed without tip control, as the head carries the tool")
+        if machine.kind != "head-head" and self.part_zero_mm is None:
+            told.append("option 'part_zero_mm' is needed without tip control, as the table carries the part")
+        return told

@@ -1,120 +1,216 @@
-"""Generic five-axis G-code with tool tip control: the control keeps the tip on the path while the axes turn."""
+"""The G-code post: five-axis programs of several controls, from dialects and machines that are data."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from sicp_cam.errors import PathError
+from sicp_cam.errors import OutputError, PathError
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import FloatArray, Program
+from sicp_cam.model import FloatArray, Program, ToolPath
 from sicp_cam.units import mm_per_unit
 from sicp_postprocessors.base import failures
-from sicp_postprocessors.checks import frame_findings, frame_name, move_place, stretch_findings
+from sicp_postprocessors.checks import frame_findings, frame_name, move_place
+from sicp_postprocessors.gcode.feeds import INVERSE_DECIMALS, feeds_of
+from sicp_postprocessors.gcode.findings import (
+    control_findings,
+    division_findings,
+    rotary_findings,
+    time_findings,
+    travel_findings,
+    without_tip_findings,
+)
+from sicp_postprocessors.gcode.machine import Machine
 from sicp_postprocessors.gcode.options import GCodeOptions
-from sicp_postprocessors.numbers import fixed, rounded, trimmed
+from sicp_postprocessors.gcode.positions import Positions, Setting, positions_of
+from sicp_postprocessors.numbers import fixed, trimmed
 from sicp_postprocessors.options import flag
-from sicp_postprocessors.rotary import HeadAngles, axes_from_angles, axis_errors_deg, head_angles
-from sicp_postprocessors.rows import rows, words
+from sicp_postprocessors.rows import rows
 from sicp_postprocessors.template import LinePostprocessor, Moves
-from sicp_postprocessors.text import pose_words
+from sicp_postprocessors.text import ascii_name, file_stem, pose_words
 
-__all__ = ["GCode", "GCodeOptions"]
+__all__ = ["GCode"]
 
 _FEED_DECIMALS = {"mm": 3, "inch": 5}
 _VERIFIED_DEG = 1e-4
+_VERIFIED_MM = 1e-3
+_HEAD_LETTERS = {"A": (1.0, 0.0, 0.0), "B": (0.0, 1.0, 0.0), "C": (0.0, 0.0, 1.0)}
 # LinuxCNC acts on comments that begin with these words: it shows them, writes files, runs Python.
 _ACTIVE_COMMENT = re.compile(r"(msg|debug|print|log|probe|py|abort)", re.IGNORECASE)
 
 
 class GCode(LinePostprocessor):
-    """G-code of a five-axis control: absolute, millimetres or inches, feed per minute.
+    """G-code of five-axis controls: absolute, millimetres or inches, feed per minute or inverse time.
 
-    Every block states its G word and all its coordinates, so that the program can be entered anywhere by eye. Rotary
-    words are checked by forward kinematics, block for block, against the axes of the path.
+    Every block states its motion and all its coordinates, so that the program can be entered anywhere by eye. What is
+    written is proved, block for block, by forward kinematics of the rounded words against the path.
     """
 
     name = "gcode"
-    summary = "five-axis G-code with tool tip control: I J K, A/B/C or Siemens A3= B3= C3="
+    summary = (
+        "five-axis G-code: Fanuc, Siemens, Heidenhain, Haas, LinuxCNC, plain; vectors or rotary axes of any machine"
+    )
     Options = GCodeOptions
     options: GCodeOptions
     suffix = ".nc"
     comment_drop = "()%;"
 
-    def reading(self) -> Mapping[str, object] | str:
-        """Say that rotary words mean nothing without the machine; those of vectors speak for themselves."""
-        return "the angles of rotary axes mean nothing without the machine" if self._is_rotary() else {}
+    def __init__(self, options: Mapping[str, object] | None = None) -> None:
+        """Take options by name, and the machine that they name.
 
-    def _is_rotary(self) -> bool:
-        return self.options.orientation == "rotary"
+        Raises
+        ------
+        JobError
+            With every option that is unknown or does not fit, and every problem of the machine's file.
+        """
+        super().__init__(options)
+        self._control = self.options.control
+        self.suffix = self._control.suffix  # type: ignore[misc]  # a default of the class, which the dialect replaces
+        self._setting = self._set_up() if self.options.words == "rotary" else None
+        self._last: tuple[Program, Positions] | None = None
+
+    def _set_up(self) -> Setting:
+        options = self.options
+        return Setting(options.rotaries(), options.tool_length_mm or 0.0, options.part_zero_mm or (0.0, 0.0, 0.0))
+
+    def reading(self) -> Mapping[str, object] | str:
+        """Return how the reader understands the rotary words, or why it cannot compare the program with the path."""
+        options = self.options
+        if options.axis_step_deg is not None:
+            return "its moves may have been divided"
+        if options.max_moves_per_program is not None:
+            return "it may have subprograms"
+        if self._setting is None:
+            return {}
+        machine = self._setting.machine
+        plain = all(
+            np.array_equal(axis.tool_direction, _HEAD_LETTERS[axis.letter]) for axis in machine.rotaries
+        ) and machine.home_axis == (0.0, 0.0, 1.0)
+        if not plain or machine.letters not in ("AC", "BC", "AB", "BA") or options.singular_cone_deg > _READ_CONE_DEG:
+            return "the angles of rotary axes mean nothing without the machine"
+        return {"rotary": machine.letters}
+
+    def positions(self, program: Program) -> Positions:
+        """Return what is written of each move; that of the program asked for last is kept."""
+        if self._last is None or self._last[0] is not program:
+            self._last = (program, positions_of(program, self.options, self._setting))
+        return self._last[1]
+
+    # --- findings ---
 
     def preflight(self, program: Program) -> list[Finding]:
-        """Return the findings of every post, of the frame of the coordinates, and of the rotary axes."""
+        """Return the findings of every post, of the frame of the coordinates, and of the axes of the machine."""
         findings = super().preflight(program)
         if failures(findings):
             return findings
         findings += frame_findings(
             program, Level.WARN, "set the work offset of the control to the pose in the head of the program"
         )
-        findings += self._offset_findings(program)
-        if self.options.orientation == "rotary":
-            findings += self._rotary_findings(program)
+        findings += control_findings(self.name, program, self.options)
+        positions = self.positions(program)
+        findings += division_findings(self.name, program, self.options, positions)
+        if failures(findings):
+            return findings
+        findings += time_findings(program, self.options, positions, feeds_of(positions, self.options))
+        if self._setting is not None:
+            about = (self.name, program, self.options, self._setting, positions)
+            findings += [*rotary_findings(*about), *without_tip_findings(*about), *travel_findings(*about)]
         return findings
 
+    # --- the verbs ---
+
+    def files(self, program: Program) -> dict[str, bytes]:
+        """Return the program, and its subprograms if it has any.
+
+        Raises
+        ------
+        PathError
+            If forward kinematics of the written words do not give tip and axis back.
+        """
+        positions = self.positions(program)
+        self._verify(program, positions)
+        whole = positions.program
+        self._last = (whole, positions)
+        bodies = self.bodies(whole)
+        if len(bodies) == 1:
+            files = {self.program_name(whole) + self.suffix: [*self.opening(whole), *bodies[0], *self.closing(whole)]}
+        else:
+            files = self._with_subprograms(whole, bodies)
+        self._last = (program, positions)
+        return {file: self.encoded(lines) for file, lines in files.items()}
+
     def start(self, program: Program) -> Iterator[str]:
-        """Return the percent sign and the O word, where the dialect has them."""
-        if self.options.dialect.percent:
-            yield "%"
-        if self.options.program_number is not None:
-            yield f"O{self.options.program_number:04d}"
+        """Return what stands before everything else: a percent sign, a program name, an O word."""
+        yield from (line.format(name=self._listed_name(program)) for line in self._control.first)
+        if self.options.number is not None:
+            yield self._control.number.format(self.options.number)
 
     def comment(self, text: str) -> str:
         """Return a comment, kept from meaning anything to a control."""
-        return self.options.dialect.comment.format(f"- {text}" if _ACTIVE_COMMENT.match(text) else text)
+        return self._control.comment.format(f"- {text}" if _ACTIVE_COMMENT.match(text) else text)
 
     def remarks(self, program: Program) -> Iterator[str]:
         """Return which control the program is for, its units, and where its coordinates are valid."""
         options = self.options
-        dwell = "milliseconds" if self._dwell_word() == "P_MS" else "seconds"
+        dwell = "milliseconds" if options.dwell == "P_MS" else "seconds"
         offset = f"work offset {options.work_offset}" if options.work_offset else "active work offset"
-        yield options.control
+        yield options.described(self._machine())
         yield f"units {options.units}, dwell in {dwell}"
+        if options.states_time:
+            yield "feeds as inverse time"
+        if not options.knows_tip:
+            yield self._set_up_words()
         yield f"coordinates in the {frame_name(program)} frame: the {offset} must hold it"
         if frame_name(program) == "part":
             yield f"its pose in the scan frame: {pose_words(program.T_scan_program)}"
 
+    def _set_up_words(self) -> str:
+        options, setting = self.options, self._setting
+        zero = " ".join(trimmed(v, 4) for v in setting.zero_mm) if setting and options.part_zero_mm else ""
+        length = f"tool length {trimmed(options.tool_length_mm, 4)} mm" if options.tool_length_mm is not None else ""
+        origin = f"program zero at {zero} mm in the machine" if zero else ""
+        return f"valid for {' and '.join(part for part in (length, origin) if part)} only"
+
+    def _machine(self) -> Machine:
+        return self._setting.machine if self._setting is not None else self.options.rotaries()
+
     def setup(self, program: Program) -> Iterator[str]:
         """Return the modes that the program relies on."""
-        options = self.options
-        unit = options.dialect.metric if options.units == "mm" else options.dialect.inch
-        yield f"{unit} G90 G94 G17 G40"
+        options, control = self.options, self._control
+        unit = control.metric if options.units == "mm" else control.inch
+        tolerance = trimmed(options.path_tolerance_mm / mm_per_unit(options.units), 6)
+        for line in control.modes:
+            yield line.format(unit=unit, feed="G93" if options.states_time else "G94", path=tolerance)
         if options.work_offset:
             yield options.work_offset
 
     def tool(self, number: int, text: str, *, first: bool) -> Iterator[str]:
         """Return a tool change, or tip control alone for the tool that is in the spindle."""
         if first:
-            yield self._tcp_on(self.options.tool)
+            yield from self._tip_on(self.options.tool)
             return
         # Tip control belongs to one tool: its length must not outlive the change.
-        yield self.options.tcp_off or self.options.dialect.tcp_off
-        yield f"T{number} M6"
+        yield from self._tip_off()
+        yield from (line.format(tool=number) for line in self._control.tool)
         yield from self.comments(text)
-        yield self._tcp_on(number)
+        yield from self._tip_on(number)
 
     def move_joint(self, moves: Moves) -> list[str]:
         """Return rapid blocks."""
-        return self._blocks("G0", moves)
+        return self._blocks(moves, rapid=True)
 
     def move_linear(self, moves: Moves) -> list[str]:
         """Return cutting blocks; the feed stands where it changes, and after every rapid move."""
-        return self._blocks("G1", moves)
+        return self._blocks(moves, rapid=False)
 
     def spindle(self, rev_min: float) -> Iterator[str]:
         """Return the words of a spindle speed."""
-        yield f"S{trimmed(abs(rev_min), 3)} {'M3' if rev_min > 0 else 'M4'}" if rev_min else "M5"
+        if not rev_min:
+            yield "M5"
+        lines = self._control.spindle[0 if rev_min > 0 else 1] if rev_min else ()
+        yield from (line.format(speed=trimmed(abs(rev_min), 3)) for line in lines)
 
     def coolant(self, on: bool) -> Iterator[str]:
         """Return the word of the coolant."""
@@ -122,120 +218,158 @@ class GCode(LinePostprocessor):
 
     def pause(self, seconds: float) -> Iterator[str]:
         """Return a dwell."""
-        if self._dwell_word() == "P_MS":
+        if self.options.dwell == "P_MS":
             yield f"G4 P{fixed(round(seconds * 1000.0), 0)}"
+        elif self.options.dwell:
+            yield f"G4 {self.options.dwell}{fixed(seconds, 3)}"
         else:
-            yield f"G4 {self._dwell_word()}{fixed(seconds, 3)}"
+            yield from (line.format(seconds=fixed(seconds, 3)) for line in self._control.pause)
 
     def stop(self, text: str) -> Iterator[str]:
         """Return a program stop."""
-        yield "M0"
+        yield self._control.stop
 
     def finish(self, program: Program) -> Iterator[str]:
         """Return the end: tip control is switched off."""
-        yield self.options.tcp_off or self.options.dialect.tcp_off
-        yield "M30"
-        if self.options.dialect.percent:
-            yield "%"
+        yield from self._tip_off()
+        yield from (line.format(name=self._listed_name(program)) for line in self._control.last)
 
     def targets(self, program: Program) -> FloatArray:
-        """Return the axes (n, 3) of every move, or its two rotary angles (n, 2) in degrees.
+        """Return the numbers of each block (n, 6): X, Y, Z, and two angles or three components of the tool axis."""
+        positions = self.positions(program)
+        return np.column_stack([positions.xyz, positions.turn])
 
-        Raises
-        ------
-        PathError
-            If forward kinematics of the written rotary words do not give the axis back.
-        """
-        axes = program.path.axes
-        if self.options.orientation != "rotary":
-            return axes
-        angles = self._rotary_angles(axes)
-        self._verify(program, angles)
-        return np.column_stack([angles.tilt_deg, angles.turn_deg])
-
-    def _blocks(self, code: str, moves: Moves) -> list[str]:
-        options, factor = self.options, mm_per_unit(self.options.units)
-        place, vector, angle = options.position_decimals, options.vector_decimals, options.angle_decimals
-        tips = f"X{{:.{place}}} Y{{:.{place}}} Z{{:.{place}}}"
-        turn = {
-            "vector": f"I{{:.{vector}}} J{{:.{vector}}} K{{:.{vector}}}",
-            "siemens": f"A3={{:.{vector}}} B3={{:.{vector}}} C3={{:.{vector}}}",
-            "rotary": f"{options.kinematics[0]}{{:.{angle}}} C{{:.{angle}}}",
-        }[options.orientation]
-        feeds = self._feed_words(moves)
-        return rows(f"{code} {tips} {turn}{{}}", *(moves.tips_mm / factor).T, *moves.targets.T, words(feeds))
-
-    def _feed_words(self, moves: Moves) -> list[str]:
-        decimals, factor = _FEED_DECIMALS[self.options.units], mm_per_unit(self.options.units)
-        stated = zip(moves.states_feed.tolist(), (moves.feeds_mm_min / factor).tolist(), strict=True)
-        return [f" F{trimmed(feed, decimals)}" if states else "" for states, feed in stated]
+    def feeds_mm_min(self, path: ToolPath) -> FloatArray:
+        """Return the numbers behind F (n,), in the unit and the feed mode of the program."""
+        if self._last is None or self._last[0].path is not path:
+            raise OutputError(f"post {self.name} was asked for feeds of another path; call files or write")
+        return feeds_of(self._last[1], self.options)
 
     def assemble(self, lines: Iterable[str]) -> Iterator[str]:
-        """Return the lines with numbered blocks; comments, the O word and percent signs have no number."""
-        number = 0
+        """Return the lines with numbered blocks; numbers begin again where the control has no larger ones."""
+        control, step = self._control, self.options.line_numbers
+        lines = _with_speeds(lines) if control.always_numbered else lines
+        number = -1 if control.always_numbered else 0
         for line in lines:
-            if self.options.line_numbers and line[0] not in "%O(;":
-                number += self.options.line_numbers
-                yield f"N{number} {line}"
-            else:
+            if len(line) > control.longest_line:
+                raise OutputError(f"post {self.name} wrote a line of {len(line)} characters; choose fewer decimals")
+            if control.always_numbered:
+                number += 1
+            elif not step or line[0] in control.unnumbered:
                 yield line
+                continue
+            else:
+                number = number + step if number + step <= control.largest_number else step
+            yield control.block_number.format(number) + line
 
-    def _rotary_angles(self, axes: FloatArray) -> HeadAngles:
-        """Return the angles as they are written, that is rounded."""
-        exact = head_angles(axes, self.options.kinematics, self.options.singular_cone_deg)
-        decimals = self.options.angle_decimals
-        return HeadAngles(rounded(exact.tilt_deg, decimals), rounded(exact.turn_deg, decimals), exact.held)
+    # --- words ---
 
-    def _offset_findings(self, program: Program) -> list[Finding]:
-        if self.options.work_offset:
-            return []
-        message = (
-            f"no work offset is written: the coordinates are those of the {frame_name(program)} frame, and the active "
-            f"offset must hold that frame; name one with {flag(self.name, 'work_offset', 'G54')}"
-        )
-        return [Finding(623, Level.INFO, message)]
+    def _blocks(self, moves: Moves, *, rapid: bool) -> list[str]:
+        options, control = self.options, self._control
+        place = f"{{:{control.sign}.{options.position_decimals}}}"
+        tips = f"X{place} Y{place} Z{place}"
+        columns = list(moves.targets.T)
+        if self._setting is None:
+            count = control.vector.count("{}")
+            turn = control.vector.format(*[f"{{:{control.sign}.{options.axis_decimals}}}"] * count)
+            columns = columns[:3] + columns[3:] * (count // 3)
+        else:
+            letters = sorted(axis.letter for axis in self._setting.machine.rotaries)
+            turn = " ".join(f"{letter}{{:{control.sign}.{options.angle_decimals}}}" for letter in letters)
+        feed, code, end = "", control.codes[0 if rapid else 1], control.codes[2] if rapid else ""
+        if not rapid and options.states_time:
+            feed = f" F{{:.{INVERSE_DECIMALS}t}}"
+            columns.append(moves.feeds_mm_min)
+        elif not rapid:
+            feed = "{}"
+            columns.append(self._feed_words(moves))
+        return rows(control.block.format(code=code, tips=tips, turn=turn, feed=feed, end=end), *columns)
 
-    def _rotary_findings(self, program: Program) -> list[Finding]:
-        path, options = program.path, self.options
-        angles = self._rotary_angles(path.axes)
-        errors = axis_errors_deg(path.axes, axes_from_angles(angles.tilt_deg, angles.turn_deg, options.kinematics))
-        cone = flag(self.name, "singular_cone_deg", f"{options.singular_cone_deg:g}")
-        travel = [flag(self.name, name, "lowest,highest") for name in ("tilt_limits_deg", "turn_limits_deg")]
-        first, (low, high), (least, most) = options.kinematics[0], options.tilt_limits_deg, options.turn_limits_deg
-        over_tilt = (angles.tilt_deg < low) | (angles.tilt_deg > high)
-        over_turn = (angles.turn_deg < least) | (angles.turn_deg > most)
-        steps = np.maximum(np.abs(np.diff(angles.turn_deg)), np.abs(np.diff(angles.tilt_deg)))
-        large = np.concatenate([[False], steps > options.rotary_step_deg]) & ~path.rapid
-        worst = float(errors[angles.held].max(initial=0.0))
-        held = f"near the pole C is held, which turns the axis by at most {worst:.4f} degrees; the cone is {cone}"
-        fast = (
-            f"a rotary axis turns further than {options.rotary_step_deg:g} degrees in one cutting move; "
-            f"divide the move, or allow it with {flag(self.name, 'rotary_step_deg', 'degrees')}"
-        )
-        tilted = f"{first} leaves its travel {low:g} to {high:g} degrees; if it can, set {travel[0]}"
-        turned = f"C leaves its travel {least:g} to {most:g} degrees; if it can, set {travel[1]}"
-        return [
-            *stretch_findings(path, angles.held, 620, Level.INFO, held),
-            *stretch_findings(path, over_tilt, 621, Level.FAIL, tilted),
-            *stretch_findings(path, over_turn, 621, Level.FAIL, turned),
-            *stretch_findings(path, large, 622, Level.WARN, fast),
-        ]
+    def _feed_words(self, moves: Moves) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
+        stated = np.flatnonzero(moves.states_feed)
+        texts = rows(f" F{{:.{_FEED_DECIMALS[self.options.units]}t}}", moves.feeds_mm_min[stated])
+        column = np.zeros(len(moves), f"S{max(map(len, texts), default=1)}")
+        column[stated] = texts
+        return column
 
-    def _verify(self, program: Program, angles: HeadAngles) -> None:
-        written = axes_from_angles(angles.tilt_deg, angles.turn_deg, self.options.kinematics)
-        errors = axis_errors_deg(program.path.axes, written)
-        precision = max(_VERIFIED_DEG, 10.0**-self.options.angle_decimals)
-        wrong = errors > precision + np.where(angles.held, self.options.singular_cone_deg, 0.0)
+    def _tip_on(self, tool: int) -> Iterator[str]:
+        control, options = self._control, self.options
+        lines: Sequence[str] = (options.tcp_on,) if options.tcp_on else control.tip_on[options.words]
+        if not options.knows_tip and not options.tcp_on and control.tip_control:
+            # What such a control would switch on is what the program does itself.
+            lines = ()
+        for line in lines:
+            if options.tcp_on or tool or not control.needs_tool:
+                yield line.replace("{tool}", f" H{tool}" if tool else "").strip()
+
+    def _tip_off(self) -> Iterator[str]:
+        options, control = self.options, self._control
+        if options.tcp_off or options.knows_tip or not control.tip_control:
+            yield options.tcp_off or control.tip_off
+
+    def _listed_name(self, program: Program) -> str:
+        return ascii_name(file_stem(program.name), 24, other="_").upper()
+
+    # --- proof, and subprograms ---
+
+    def _verify(self, program: Program, positions: Positions) -> None:
+        options, cone = self.options, self.options.singular_cone_deg
+        decimals = options.angle_decimals if self._setting is not None else options.axis_decimals
+        precision = max(_VERIFIED_DEG, (1.0 if self._setting is not None else 60.0) * 10.0**-decimals)
+        held = 0.0 if positions.angles is None else np.where(positions.angles.held, cone, 0.0)
+        off_axis = positions.axis_errors_deg > precision + held
+        off_tip = positions.tip_errors_mm > mm_per_unit(options.units) * 10.0**-options.position_decimals
+        wrong = off_axis | off_tip
         if wrong.any():
             move = int(np.argmax(wrong))
+            missed = (
+                f"tool axis by {positions.axis_errors_deg[move]:.5f} degrees"
+                if off_axis[move]
+                else f"tip by {positions.tip_errors_mm[move]:.5f} mm"
+            )
             raise PathError(
-                f"post {self.name}, {move_place(program.path, move)}: the rotary words miss the tool axis by "
-                f"{errors[move]:.5f} degrees; set {flag(self.name, 'orientation', 'vector')} and report this"
+                f"post {self.name}, {move_place(program.path, int(positions.origin[move]))}: the words miss the "
+                f"{missed}; set {flag(self.name, 'orientation', 'vector')} and report this"
             )
 
-    def _tcp_on(self, tool: int) -> str:
-        words = self.options.tcp_on or self.options.dialect.tcp_on
-        return words.replace("{tool}", f" H{tool}" if tool else "").strip()
+    def _with_subprograms(self, program: Program, bodies: list[list[str]]) -> dict[str, list[str]]:
+        """Return the lines of a main program that calls its parts, and of each part, by file name."""
+        kind = self._control.subprograms
+        if kind is None:
+            raise OutputError(f"post {self.name} has no subprograms for this dialect; leave max_moves_per_program out")
+        stem = self.program_name(program)
+        listed = ascii_name(file_stem(program.name), kind.longest_name - 5, other="_")
+        listed = listed.lower() if self._control.family == "LinuxCNC" else listed.upper()
+        calls, parts = [], {}
+        for count, body in enumerate(bodies, 1):
+            number = (self.options.number or 0) + count
+            words = {"name": f"{listed}_{count}", "number": number, "o": self._control.number.format(number)}
+            calls.append(kind.call.format(**words))
+            first, last = ([line.format(**words) for line in lines] for lines in (kind.start, kind.end))
+            ends = ["%"] if "%" in self._control.first else []
+            file = f"{stem}_{count}" if kind.numbered else words["name"]
+            parts[f"{file}{kind.suffix or self.suffix}"] = [*ends, *first, *body, *last, *ends]
+        return {stem + self.suffix: [*self.opening(program), *calls, *self.closing(program)], **parts}
 
-    def _dwell_word(self) -> str:
-        return self.options.dwell or self.options.dialect.dwell
+
+_READ_CONE_DEG = 0.001
+"""Reading back asks for axes as good as this."""
+
+
+def _with_speeds(lines: Iterable[str]) -> Iterator[str]:
+    """Join the speed of a spindle to the tool call right before it: `TOOL CALL 3 Z S12000`."""
+    waiting: list[str] = []
+    for line in lines:
+        if line.startswith("TOOL CALL S") and waiting:
+            waiting[0] += line.removeprefix("TOOL CALL")
+            continue
+        if line.startswith("TOOL CALL ") and not line.startswith("TOOL CALL S"):
+            yield from waiting
+            waiting = [line]
+        elif waiting and line.startswith(("; ", "M126", "M128", "FUNCTION TCPM")):
+            waiting.append(line)
+        else:
+            yield from waiting
+            waiting = []
+            yield line
+    yield from waiting
