@@ -248,8 +248,8 @@ def _program(
         source_moves=np.arange(len(path)),
         corrected=False,
     )
-    files: dict[str, bytes] = post.write(program)
     findings = tuple(post.preflight(program))
+    files: dict[str, bytes] = post.write(program, findings)
     if len(files) == 1 and job.target.suffix:
         files = {job.target.name: next(iter(files.values()))}
     told = job.in_options if name == "same" else None

@@ -111,9 +111,10 @@ class Correction:
         """Return the files that a postprocessor makes of the program, read back and compared, and what it noticed."""
         writer = plugins.postprocessor(post, options or {})
         program = self.program
-        files = writer.write(program)
+        noticed = writer.preflight(program)
+        files = writer.write(program, noticed)
         back = read_back(writer, program, files, limits=self.job.limits)
-        return files, (*writer.preflight(program), *back.findings)
+        return files, (*noticed, *back.findings)
 
     def write(self, post: str, out: str | Path, *, force: bool = False, **options: object) -> list[Path]:
         """Write the program for one controller into a folder and return the files.

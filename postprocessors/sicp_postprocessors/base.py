@@ -86,8 +86,15 @@ class Postprocessor(ABC):
         """
         return common_findings(program, self.missing_feed)
 
-    def write(self, program: Program) -> dict[str, bytes]:
+    def write(self, program: Program, noticed: Iterable[Finding] | None = None) -> dict[str, bytes]:
         """Return the files of a program: relative names with forward slashes, and their bytes.
+
+        Parameters
+        ----------
+        program
+            What is to be written.
+        noticed
+            What `preflight` has returned for this program, where it has been asked already; it can take long.
 
         Raises
         ------
@@ -96,7 +103,7 @@ class Postprocessor(ABC):
         OutputError
             If the post itself makes a file that may not be written.
         """
-        failed = failures(self.preflight(program))
+        failed = failures(self.preflight(program) if noticed is None else noticed)
         if failed:
             told = [f"{f.where}: {f.message}" if f.where else f.message for f in failed[:_NAMED_FAILURES]]
             more = [f"and {len(failed) - _NAMED_FAILURES} more"] if len(failed) > _NAMED_FAILURES else []
