@@ -38,8 +38,9 @@ class Dialect:
         For each way to state the tool axis, the first being the usual one: what the head says of its words.
     tip_on
         For each of them, the lines that switch tool tip control on; `{tool}` is the H word of the tool, or nothing.
-    needs_tool
-        True: those lines need a tool's number, and are left out without one.
+    length_on, length_off
+        Words of the tool length, where they are not those of tip control: `{tool}` is the H word; left out without a
+        tool's number.
     tip_off
         The word that switches it off, before a tool change and at the end; may be empty.
     tip_control
@@ -53,15 +54,24 @@ class Dialect:
     block
         Template of a move: `{code}`, `{tips}`, `{turn}`, `{feed}`.
     codes
-        What stands at `{code}` of a rapid and of a cutting block, and what ends a rapid block.
+        What stands at `{code}` of a rapid and of a cutting block, and what ends a rapid block; `vector_codes` where
+        those of blocks with vectors are others.
     sign
         Sign of numbers: "" for minus only, "+" for both.
     program
         Lines before and after everything else, `{name}` and `{unit}` within.
     number
         Template of the O line, empty where programs have no numbers; `smallest_number` where one must have it.
-    tool, spindle, off, pause, stop
+    tool, spindle, pause, stop
         Lines of events.
+    offset
+        An example of a work offset; empty where one is not chosen by a word.
+    block_number, unnumbered, always_numbered, largest_number
+        How blocks are numbered, first characters of lines that are not, whether all are, when they restart.
+    shorter_way
+        The word by which rotary axes go the shorter way, within a turn; empty where that is a setting of the machine.
+    largest_inverse
+        Largest F under G93; None where the control has no G93.
     """
 
     family: str
@@ -72,12 +82,14 @@ class Dialect:
     comment: str
     metric: str | None = "G21"
     inch: str | None = "G20"
-    needs_tool: bool = False
+    length_on: str = ""
+    length_off: str = ""
     tip_control: bool = True
     modes: tuple[str, ...] = ("{unit} G90 {feed} G17 G40",)
     vector: str = "I{} J{} K{}"
     block: str = "{code} {tips} {turn}{feed}{end}"
     codes: tuple[str, str, str] = ("G0", "G1", "")
+    vector_codes: tuple[str, str, str] | None = None
     sign: str = ""
     first: tuple[str, ...] = ()
     last: tuple[str, ...] = ("M30",)
@@ -87,6 +99,7 @@ class Dialect:
     spindle: tuple[tuple[str, ...], tuple[str, ...]] = (("S{speed} M3",), ("S{speed} M4",))
     pause: tuple[str, ...] = ("G4 P{seconds}",)
     stop: str = "M0"
+    offset: str = "G54"
     block_number: str = "N{} "
     unnumbered: str = "%O(;o"
     always_numbered: bool = False
@@ -158,6 +171,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             vector="NX{} NY{} NZ{} TX{} TY{} TZ{}",
             block="{code} {tips} {turn}{feed}{end}",
             codes=("L", "L", " R0 FMAX"),
+            vector_codes=("LN", "LN", " FMAX"),
             sign="+",
             first=("BEGIN PGM {name} MM",),
             last=("M30", "END PGM {name} MM"),
@@ -165,6 +179,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             spindle=(("TOOL CALL S{speed}", "M3"), ("TOOL CALL S{speed}", "M4")),
             pause=("CYCL DEF 9.0 DWELL TIME", "CYCL DEF 9.1 DWELL {seconds}"),
             stop="STOP",
+            offset="",
             block_number="{} ",
             unnumbered="",
             always_numbered=True,
@@ -191,9 +206,10 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
         "linuxcnc": Dialect(
             family="LinuxCNC",
             orientations=_only(_ROTARY),
-            tip_on=MappingProxyType({"rotary": ("G43{tool}",)}),
-            needs_tool=True,
-            tip_off="G49",
+            tip_on=MappingProxyType({"rotary": ()}),
+            tip_off="",
+            length_on="G43{tool}",
+            length_off="G49",
             suffix=".ngc",
             comment="({})",
             modes=("{unit} G90 {feed} G17 G40", "G64 P{path}"),
@@ -205,9 +221,10 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
         "plain": Dialect(
             family="ISO without tool tip control",
             orientations=_only(_ROTARY),
-            tip_on=MappingProxyType({"rotary": ("G43{tool}",)}),
-            needs_tool=True,
-            tip_off="G49",
+            tip_on=MappingProxyType({"rotary": ()}),
+            tip_off="",
+            length_on="G43{tool}",
+            length_off="G49",
             tip_control=False,
             suffix=".nc",
             comment="({})",

@@ -43,8 +43,10 @@ def control_findings(post: str, program: Program, options: GCodeOptions) -> Iter
     if not options.work_offset:
         message = (
             f"no work offset is written: the coordinates are those of the {frame_name(program)} frame, and the active "
-            f"offset must hold that frame; name one with {flag(post, 'work_offset', 'G54')}"
+            "offset must hold that frame"
         )
+        if options.control.offset:
+            message += f"; name one with {flag(post, 'work_offset', options.control.offset)}"
         yield Finding(623, Level.INFO, message)
     if options.dialect == "linuxcnc" and options.knows_tip and not options.tcp_on:
         message = (

@@ -167,7 +167,7 @@ class GCodeOptions(PreflightOptions):
         if self.tcp_on:
             return f"tool tip control {' '.join(self.tcp_on.replace('{tool}', '').split())}: {words}"
         kinds = {"G43.5": "Fanuc G43.5 type 2", "G43.4": "Fanuc G43.4 type 1"}
-        first = control.tip_on[self.words][0].replace("{tool}", "")
+        first = "".join(control.tip_on[self.words][:1]).replace("{tool}", "")
         return f"{kinds.get(first, control.family)}: {words}"
 
     def _word_problems(self) -> list[str]:
@@ -188,6 +188,8 @@ class GCodeOptions(PreflightOptions):
             told.append(f"option 'inverse_time' has no meaning for dialect {self.dialect}, which knows tip control")
         if self.max_moves_per_program and control.subprograms and control.subprograms.numbered and not self.number:
             told.append("option 'max_moves_per_program' needs 'program_number', from which subprograms are counted")
+        if self.dwell and len(control.pause) > 1:
+            told.append(f"option 'dwell' has no meaning for dialect {self.dialect}, which has lines of its own for it")
         if self.words == "vector":
             if not self.knows_tip:
                 told.append("option 'tip_control' off needs orientation rotary: the machine moves two rotary axes")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -276,7 +276,8 @@ class GCode(LinePostprocessor):
         else:
             letters = sorted(axis.letter for axis in self._setting.machine.rotaries)
             turn = " ".join(f"{letter}{{:{control.sign}.{options.angle_decimals}}}" for letter in letters)
-        feed, code, end = "", control.codes[0 if rapid else 1], control.codes[2] if rapid else ""
+        codes = control.codes if self._setting is not None else control.vector_codes or control.codes
+        feed, code, end = "", codes[0 if rapid else 1], codes[2] if rapid else ""
         if not rapid and options.states_time:
             feed = f" F{{:.{INVERSE_DECIMALS}t}}"
             columns.append(moves.feeds_mm_min)
@@ -293,19 +294,17 @@ class GCode(LinePostprocessor):
         return column
 
     def _tip_on(self, tool: int) -> Iterator[str]:
-        control, options = self._control, self.options
-        lines: Sequence[str] = (options.tcp_on,) if options.tcp_on else control.tip_on[options.words]
-        if not options.knows_tip and not options.tcp_on and control.tip_control:
-            # What such a control would switch on is what the program does itself.
-            lines = ()
-        for line in lines:
-            if options.tcp_on or tool or not control.needs_tool:
-                yield line.replace("{tool}", f" H{tool}" if tool else "").strip()
+        options, control = self.options, self._control
+        if control.length_on and tool:
+            yield control.length_on.format(tool=f" H{tool}")
+        # What a control with tip control would switch on, a program without it does itself.
+        lines = control.tip_on[options.words] if options.knows_tip else ()
+        for line in (options.tcp_on,) if options.tcp_on else lines:
+            yield line.replace("{tool}", f" H{tool}" if tool else "").strip()
 
     def _tip_off(self) -> Iterator[str]:
         options, control = self.options, self._control
-        if options.tcp_off or options.knows_tip or not control.tip_control:
-            yield options.tcp_off or control.tip_off
+        yield from filter(None, (options.tcp_off or (control.tip_off if options.knows_tip else ""), control.length_off))
 
     def _listed_name(self, program: Program) -> str:
         return ascii_name(file_stem(program.name), 24, other="_").upper()
