@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -34,6 +35,8 @@ _FRAME_STATED = 317
 """Warns whoever corrects a path; that a written program says in which frame its points stand is as it should be."""
 
 _MANIFEST = "result.json"
+_PART = re.compile(r"(.+?)_?[0-9]{3,}", re.ASCII)
+"""Name of a program that another one calls, which bears the rest of the name: a part of a long path."""
 _MANIFEST_BYTES = 2**26
 
 
@@ -160,7 +163,7 @@ def _written(folder: Path) -> tuple[Path, ...]:
         raise InputError(f"{name}: is no result of a run; name the programs in the folder") from error
     files = [folder / name for name in names if _is_below(name)]
     of_project = {file.parent for file in files if plugins.suffix_of(file) == "pjx"}
-    found = [file for file in files if "path" in plugins.roles(file) and _begins(file, of_project)]
+    found = [file for file in files if "path" in plugins.roles(file) and _begins(file, of_project, files)]
     if not found:
         raise InputError(f"{name}: names no program that can be read; name the programs in the folder")
     return tuple(sorted(found))
@@ -171,9 +174,13 @@ def _is_below(name: str) -> bool:
     return not path.is_absolute() and ".." not in path.parts
 
 
-def _begins(file: Path, of_project: set[Path]) -> bool:
-    """Say whether a file is the one to read a program by."""
-    return plugins.suffix_of(file) == "pjx" or not any(folder in of_project for folder in file.parents)
+def _begins(file: Path, of_project: set[Path], files: list[Path]) -> bool:
+    """Say whether a file is the one to read a program by: a .pjx or .pgf that lists others, or no part of another."""
+    if plugins.suffix_of(file) in ("pjx", "pgf"):
+        return True
+    part = _PART.fullmatch(file.stem)
+    whole = {file.with_suffix(".pgf"), *([] if part is None else [file.with_name(part[1] + file.suffix)])}
+    return not (any(folder in of_project for folder in file.parents) or whole & set(files))
 
 
 # --- options ---

@@ -180,3 +180,21 @@ def test_a_checker_that_answers_anything_else_is_named(third_party):
     third_party(".override]\nnc = odd_checker:check", "def check(path, *, limits):\n    return ['x']\n")
     with pytest.raises(JobError, match="odd_checker:check answered with something else"):
         check(Check((NC,)))
+
+
+def test_parts_of_a_long_program_are_checked_with_the_program_that_calls_them(tmp_path):
+    names = [
+        "trim.src",
+        "trim_001.src",
+        "trim_002.src",
+        "door.pgf",
+        "door.mod",
+        "door_001.mod",
+        "X.ls",
+        "X001.ls",
+        "op_100.apt",
+    ]
+    (tmp_path / "result.json").write_text(
+        json.dumps({"outputs": [{"kind": "program", "path": name} for name in names]})
+    )
+    assert [file.name for file in programs_of(tmp_path)] == ["X.ls", "door.pgf", "op_100.apt", "trim.src"]

@@ -72,7 +72,7 @@ class RoboDkCsv(Postprocessor):
 
     def reading(self) -> Mapping[str, object]:
         """Name the columns, which have no header."""
-        return {"columns": "x,y,z,w,p,r,-,speed_mm_s,rapid,-", "euler": "zyx"}
+        return {"columns": "x_mm,y_mm,z_mm,w,p,r,-,speed_mm_s,rapid,-", "euler": "zyx"}
 
     def files(self, program: Program) -> dict[str, bytes]:
         """Return the one table."""

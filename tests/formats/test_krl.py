@@ -166,3 +166,17 @@ def test_damaged_programs_give_a_path_or_a_typed_error(data: st.DataObject) -> N
             assert str(error).isprintable()
         else:
             assert np.allclose(np.linalg.norm(path.axes, axis=1), 1)
+
+
+def test_programs_beside_it_are_called_by_their_name(tmp_path: Path) -> None:
+    (tmp_path / "Part_1.SRC").write_text("&ACCESS RVP\nDEF part_1( )\nLIN XP1\nEND\n")
+    (tmp_path / "Part_1.dat").write_text(f"DEFDAT part_1\nDECL E6POS XP1={Q}\nENDDAT\n")
+    path = read(tmp_path, f"$VEL.CP=0.1\nPTP {P}\nPART_1( )\nWAIT SEC 0\nLIN {P}")
+    assert path.tips_mm[:, 0].tolist() == [0, 9, 0]
+    assert path.feeds_mm_min.tolist() == [0, 6000, 6000] and path.lines.tolist() == [0, 0, 0]
+    assert not [event for event in path.events if event.kind is EventKind.DWELL]
+    with pytest.raises(FormatError, match=r"a\.src, line 2: 'XP1' is declared nowhere"):
+        read(tmp_path, "LIN XP1\nPART_1( )")
+    (tmp_path / "Part_1.SRC").write_text("DEF part_1( )\nLIN XP2\nEND\n")
+    with pytest.raises(FormatError, match=r"Part_1\.SRC, line 2: 'XP2' is declared nowhere"):
+        read(tmp_path, f"PTP {P}\nPART_1( )")

@@ -155,3 +155,38 @@ def test_damaged_modules_give_a_path_or_a_typed_error(data: st.DataObject) -> No
             assert str(error).isprintable()
         else:
             assert np.allclose(np.linalg.norm(path.axes, axis=1), 1)
+
+
+PART = "MODULE B\nPROC cut()\nMoveL {},v100,z1,tool0;\nENDPROC\nENDMODULE\n"
+
+
+def modules(folder: Path, listed: str = "a.mod", **files: str) -> Path:
+    for name, text in files.items():
+        (folder / f"{name}.mod").write_text(text)
+    (folder / "a.pgf").write_text(
+        f"<Program>\n  <Module>{listed}</Module>\n  <Module>C:\\x\\b.mod</Module>\n</Program>"
+    )
+    return folder / "a.pgf"
+
+
+MAIN = f"MODULE A\nCONST robtarget q:={Q};\nPROC main()\nMoveJ {P}{END}\ncut;\nENDPROC\nENDMODULE\n"
+
+
+def test_a_program_of_several_modules_is_read_by_its_list(tmp_path: Path) -> None:
+    path = read_path(modules(tmp_path, a=MAIN, b=PART.format("q")))
+    assert path.tips_mm[:, 0].tolist() == [0, 9] and path.lines.tolist() == [0, 0]
+    with pytest.raises(FormatError, match=r"b\.mod, line 3: 'x' is declared nowhere"):
+        read_path(modules(tmp_path, a=MAIN, b=PART.format("x")))
+    with pytest.raises(FormatError, match="has the procedure cut in two modules"):
+        read_path(modules(tmp_path, a=MAIN.replace("main", "cut"), b=PART.format("q")))
+    with pytest.raises(FormatError, match=r"lists c\.mod, which does not lie beside it"):
+        read_path(modules(tmp_path, "c.mod", a=MAIN, b=PART.format("q")))
+    (tmp_path / "a.pgf").write_text("<Program/>")
+    with pytest.raises(FormatError, match="lists no <Module>"):
+        read_path(tmp_path / "a.pgf")
+
+
+def test_without_main_the_procedure_that_no_other_calls_is_the_first(tmp_path: Path) -> None:
+    text = f"MODULE A\nPROC b()\nMoveL {Q}{END}\nENDPROC\nPROC a()\nMoveJ {P}{END}\nb;\nENDPROC\nENDMODULE\n"
+    (tmp_path / "a.mod").write_text(text)
+    assert read_path(tmp_path / "a.mod").tips_mm[:, 0].tolist() == [0, 9]

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
-from sicp_cam.errors import FormatError, printable
+from sicp_cam.errors import FormatError
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_formats.paths.moves import MoveList, check_options
 from sicp_formats.paths.text import program_lines
 from sicp_formats.rapid.data import Data
 from sicp_formats.rapid.run import RapidRunner
-from sicp_formats.rapid.text import Module, Routine, read_module
+from sicp_formats.rapid.text import Module, Routine, module_files, read_module
 from sicp_formats.robot.motion import RobotMoves, subprograms_named, tool_side
 from sicp_formats.source import read_bytes
 
 __all__ = ["read_path"]
 
-_MODULE = re.compile(r"<Module>([^<>]*)</Module>", re.IGNORECASE)
+_CALL = re.compile(r"(\w+)[ \t]*", re.ASCII)
 
 
 def read_path(
@@ -55,7 +55,7 @@ def read_path(
     chord_mm, step_mm
         How far a piece of an arc may lie from it, and how long it may be.
     program
-        Procedure to begin with; `main`, or the only one, if left out.
+        Procedure to begin with; `main`, or the only one that no other calls, if left out.
     tool_axis
         Axis of the tool frame that points from the tip to the holder.
     calls
@@ -73,7 +73,7 @@ def read_path(
     check_options(feed_mm_min=feed_mm_min, chord_mm=chord_mm, step_mm=step_mm)
     side = tool_side(tool_axis)
     content = read_bytes(path, limits)
-    files = _listed(path, content, limits) if ".pgf" in path.name.lower() else {path: content}
+    files = module_files(path, content, limits)
     modules = [read_module(file, "\n".join(program_lines(file, text, limits))) for file, text in files.items()]
     module = _together(path, modules)
     moves = MoveList(path, limits, units, chord_mm, step_mm)
@@ -91,18 +91,6 @@ def read_path(
     return moves.build(content, format="RAPID", name=module.name or first, feed_mm_min=feed_mm_min)
 
 
-def _listed(path: Path, content: bytes, limits: Limits) -> dict[Path, bytes]:
-    """Return the modules that a .pgf lists, with their text, in its order."""
-    names = _MODULE.findall("\n".join(program_lines(path, content, limits)))
-    if not names:
-        raise FormatError(path, "lists no <Module>; is this a RAPID program (.pgf)?", line=1)
-    files = [path.with_name(PureWindowsPath(name.strip()).name) for name in names]
-    missing = next((file for file in files if not file.is_file()), None)
-    if missing is not None:
-        raise FormatError(path, f"lists {printable(missing.name, 60)}, which does not lie beside it", line=1)
-    return {file: read_bytes(file, limits) for file in files}
-
-
 def _together(path: Path, modules: list[Module]) -> Module:
     """Return the modules of a program as one; names of procedures must differ."""
     routines: dict[str, Routine] = {}
@@ -117,7 +105,14 @@ def _first_routine(path: Path, module: Module, program: str | None) -> str:
     wanted = "main" if program is None else program.lower()
     if wanted in module.routines:
         return wanted
-    if program is None and len(module.routines) == 1:
-        return next(iter(module.routines))
+    called = {name for each in module.routines.values() for name in _called(each)}
+    first = [name for name in module.routines if name not in called]
+    if program is None and len(first) == 1:
+        return first[0]
     known = ", ".join(list(module.routines)[:10])
     raise FormatError(path, f"has no procedure {wanted}; choose with --set path.program=NAME one of {known}", line=1)
+
+
+def _called(routine: Routine) -> set[str]:
+    """Return the lower-case names of what a procedure may call without arguments."""
+    return {found[1].lower() for each in routine.statements if (found := _CALL.fullmatch(each.text))}

@@ -18,7 +18,7 @@ from sicp_formats.paths.arcs import Vector
 from sicp_formats.paths.defects import Check, Defects, check_characters, last_line
 from sicp_formats.paths.text import program_lines
 from sicp_formats.rapid.data import DECLARED, PREDEFINED_MM_S, Data, Target, arguments_of, parsed_list
-from sicp_formats.rapid.text import Module, read_module
+from sicp_formats.rapid.text import Module, module_files, read_module
 from sicp_formats.robot.check import Blend, check_blends, check_declared, check_name
 from sicp_formats.robot.motion import number_of
 from sicp_formats.robot.program import RobotError, Statement
@@ -50,7 +50,7 @@ def check(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[Finding, ...]
     Parameters
     ----------
     path
-        The .mod or .prg file.
+        The .mod or .prg file, or the .pgf that lists the modules beside it.
     limits
         Caps on it.
 
@@ -59,22 +59,25 @@ def check(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[Finding, ...]
     FormatError
         If the file is no module, or a statement or routine is not closed.
     """
-    lines = program_lines(path, read_bytes(path, limits), limits)
-    module = read_module(path, "\n".join(lines))
-    defects = Defects(path)
-    check_characters(defects, lines)
-    _check_form(defects, module, lines)
     data, declared = Data(), dict[str, _Declared]()
-    for statement in _declarations(module):
-        _declare(defects, statement, data, declared)
-    moves = _Moves(defects, data, declared)
-    for routine in module.routines.values():
-        moves.check(routine.statements)
-    used = moves.used | _named_in_values(data)
-    for kind, noun in (_OF_DATA | _OF_CELL).items():
-        unused = {d.name: d.line for key, d in declared.items() if d.kind == kind and key not in used}
-        check_declared(defects, unused, (), noun)
-    return defects.findings()
+    modules: list[tuple[Defects, Module]] = []
+    for file, content in module_files(path, read_bytes(path, limits), limits).items():
+        lines = program_lines(file, content, limits)
+        modules.append((Defects(file), read_module(file, "\n".join(lines))))
+        check_characters(modules[-1][0], lines)
+        _check_form(*modules[-1], lines)
+        for statement in _declarations(modules[-1][1]):
+            _declare(modules[-1][0], statement, data, declared)
+    used = _named_in_values(data)
+    for defects, module in modules:
+        moves = _Moves(defects, data, declared)
+        for routine in module.routines.values():
+            moves.check(routine.statements)
+        used |= moves.used
+    for key, each in declared.items():
+        if each.kind in _OF_DATA | _OF_CELL and key not in used:
+            check_declared(each.defects, {each.name: each.line}, (), (_OF_DATA | _OF_CELL)[each.kind])
+    return tuple(finding for defects, _ in modules for finding in defects.findings())
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +86,7 @@ class _Declared:
     kind: str
     storage: str
     line: int
+    defects: Defects
 
 
 def _check_form(defects: Defects, module: Module, lines: list[str]) -> None:
@@ -114,7 +118,7 @@ def _declare(defects: Defects, statement: Statement, data: Data, declared: dict[
     check_name(defects, name, statement.line, longest=_LONGEST_NAME, allowed=_NAME, noun=kind)
     if name.lower() in declared:
         defects.fail(Check.SYMBOLS, f"{name} is declared twice", statement.line)
-    declared[name.lower()] = _Declared(name, kind, storage, statement.line)
+    declared[name.lower()] = _Declared(name, kind, storage, statement.line, defects)
     data.declare(statement.text)
     value = (found[4] or "").strip()
     if kind in _OF_CELL and storage != "PERS":

@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 
 from sicp_cam.errors import FormatError, printable
+from sicp_cam.limits import Limits
+from sicp_formats.paths.text import program_lines
 from sicp_formats.robot.program import Statement
+from sicp_formats.source import read_bytes
 
-__all__ = ["Module", "Routine", "read_module"]
+__all__ = ["Module", "Routine", "module_files", "read_module"]
 
 _FILE_HEADER = re.compile(r"\s*%%%[^%]*%%%")
 _TOKEN = re.compile(r'"(?:[^"\n]|"")*"?|!.*|;|\n|[^"!;\n]+')
@@ -27,6 +30,7 @@ _INLINE = re.compile(
 )
 _LONGEST_HEAD = 2000
 _DECLARATION = re.compile(r"(?:(?:LOCAL|TASK)[ \t]+)?(?:CONST|PERS|VAR|ALIAS)\b", re.IGNORECASE)
+_LISTED = re.compile(r"<Module>([^<>]*)</Module>", re.IGNORECASE)
 _NAME = re.compile(r"(\w+)[ \t]*(?:\((.*)\))?[ \t]*", re.ASCII | re.DOTALL)
 
 
@@ -47,6 +51,26 @@ class Module:
     name: str
     declarations: tuple[Statement, ...]
     routines: dict[str, Routine]
+
+
+def module_files(path: Path, content: bytes, limits: Limits) -> dict[Path, bytes]:
+    """Return the modules of a program with their text: the file itself, or those that a .pgf lists, in its order.
+
+    Raises
+    ------
+    FormatError
+        If a .pgf lists none, or one that does not lie beside it.
+    """
+    if ".pgf" not in path.name.lower():
+        return {path: content}
+    names = _LISTED.findall("\n".join(program_lines(path, content, limits)))
+    if not names:
+        raise FormatError(path, "lists no <Module>; is this a RAPID program (.pgf)?", line=1)
+    files = [path.with_name(PureWindowsPath(name.strip()).name or "?") for name in names]
+    missing = next((file for file in files if not file.is_file()), None)
+    if missing is not None:
+        raise FormatError(path, f"lists {printable(missing.name, 60)}, which does not lie beside it", line=1)
+    return {file: read_bytes(file, limits) for file in files}
 
 
 def read_module(path: Path, text: str) -> Module:
