@@ -159,7 +159,14 @@ class RobotPostprocessor(LinePostprocessor):
         return self.pose_of_six(self.options.tool or ZERO)
 
     def events(self, program: Program) -> list[Event]:
-        """Return the events with what a tool change by hand needs: the spindle off before it, a stop behind it."""
+        """Return the events as the program tells them, with what a person must do in its place.
+
+        A tool change by hand needs the spindle off before it, and a stop behind it. A spindle that no output starts is
+        started by the operator, for whom the program stops; what no output switches off is told in a comment.
+        """
+        return [self._told_by_hand(event) for event in self._with_tool_changes(program)]
+
+    def _with_tool_changes(self, program: Program) -> list[Event]:
         told: list[Event] = []
         runs = False
         for event in events_in_order(program.path):
@@ -174,6 +181,26 @@ class RobotPostprocessor(LinePostprocessor):
             elif event.kind is EventKind.SPINDLE:
                 runs = event.value != 0.0
         return told
+
+    def _told_by_hand(self, event: Event) -> Event:
+        """Return a stop or comment in place of an event that no output switches, other events as they are."""
+        clockwise, counter = self.spindle_signals()
+        if event.kind is EventKind.COOLANT and not self.coolant_signal():
+            text = f"coolant {'on' if event.value > 0 else 'off'}: no output is named for it"
+            return Event(event.before_move, EventKind.COMMENT, 0.0, text, event.line)
+        if event.kind is not EventKind.SPINDLE or self._commands_speed():
+            return event
+        if (counter if event.value < 0.0 else clockwise) or (event.value == 0.0 and counter):
+            return event
+        if event.value == 0.0:
+            text = "spindle off: no output is named for it"
+            return Event(event.before_move, EventKind.COMMENT, 0.0, text, event.line)
+        sense = "counter-clockwise" if event.value < 0.0 else "clockwise"
+        text = f"start the spindle: {trimmed(abs(event.value), 3)} rev/min {sense}"
+        return Event(event.before_move, EventKind.STOP, 0.0, text, event.line)
+
+    def _commands_speed(self) -> bool:
+        return getattr(self.options, "spindle_speed", "none") != "none"
 
     def switched(self, event: Event) -> tuple[str, bool] | None:
         """Return the output that a word of the path switches, by the option `outputs`."""

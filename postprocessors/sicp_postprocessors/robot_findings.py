@@ -74,12 +74,15 @@ def _cell_findings(path: ToolPath, options: RobotOptions, post: str) -> list[Fin
             f"degrees with {flag(post, 'cell', _SIX)}"
         )
         findings.append(Finding(631, Level.WARN, message))
-    links = {EventKind.SPINDLE: options.spindle_output, EventKind.COOLANT: options.coolant_output}
+    signals = {
+        EventKind.SPINDLE: (options.spindle_output, "the program stops for the operator to start it"),
+        EventKind.COOLANT: (options.coolant_output, "nothing switches it"),
+    }
     kinds = {event.kind for event in path.events}
-    for kind, link in links.items():
-        if kind in kinds and not link:
+    for kind, (signal, instead) in signals.items():
+        if kind in kinds and not signal:
             words = flag(post, f"{kind}_output", "OUTPUT")
-            message = f"no output is named that switches the {kind}; name it with {words}"
+            message = f"no output is named for the {kind}, so {instead}; name it with {words}"
             findings.append(Finding(632, Level.WARN, message))
     return findings
 
@@ -94,7 +97,7 @@ def _spindle_findings(path: ToolPath, options: RobotOptions, post: str) -> list[
         findings += [Finding(633, Level.FAIL, message, event_place(e)) for e in starts if e.value < 0]
     if starts and getattr(options, "spindle_speed", "none") == "none":
         speeds = ", ".join(f"{abs(speed):g}" for speed in dict.fromkeys(event.value for event in starts))
-        words = f", or {flag(post, 'spindle_speed', 'num')} (or aio)" if hasattr(options, "spindle_speed") else ""
+        words = f", or {flag(post, 'spindle_speed', 'aio')}" if hasattr(options, "spindle_speed") else ""
         message = f"the spindle speed is not commanded: set {speeds} rev/min at the drive{words}"
         findings.append(Finding(634, Level.INFO, message))
     message = "cuts with the spindle off after a tool change; start the spindle in the path after the change"

@@ -129,7 +129,8 @@ class TestProgram:
         assert np.allclose(np.array(result.feeds)[cuts], program.path.feeds_mm_min[cuts], rtol=1e-6)
 
     def test_events_wait_for_the_end_of_the_move(self):
-        _, result = read_val3(Val3().write(simple_program()))
+        linked = {"spindle_output": "B\\%Q0", "coolant_output": "B\\%Q1"}
+        _, result = read_val3(Val3(linked).write(simple_program()))
         actions = [a for a in result.actions if a[0] != "comment" or a[1] in ("first side", "tool 3 LOADTL/3")]
         told = [(kind, value["index"]) if kind in MOVES else (kind, value) for kind, value in actions]
         assert told == [
@@ -254,7 +255,9 @@ class TestProgram:
         assert f"{frame} {world} points: mm" in head
 
     def test_stop_switches_off(self):
-        assert load_val3(Val3().write(simple_program())).code["stop"] == ["doSpindle=false", "doCoolant=false"]
+        linked = {"spindle_output": "B\\%Q0", "coolant_output": "B\\%Q1"}
+        assert load_val3(Val3(linked).write(simple_program())).code["stop"] == ["doSpindle=false", "doCoolant=false"]
+        assert load_val3(Val3().write(simple_program())).code["stop"] == []
         assert load_val3(Val3().write(straight_program(2))).code["stop"] == []
 
 
@@ -408,7 +411,7 @@ class TestSpindleAndTools:
             PathError, match=r"before move 1, line 4: .*counter-clockwise.*--set post\.val3\.spindle_ccw_output="
         ):
             Val3().write(program)
-        app, result = read_val3(Val3({"spindle_ccw_output": "B\\%Q1"}).write(program))
+        app, result = read_val3(Val3({"spindle_output": "B\\%Q0", "spindle_ccw_output": "B\\%Q1"}).write(program))
         outputs = [value for kind, value in result.actions if kind == "output"]
         off = [("doSpindleCcw", "false"), ("doSpindle", "false")]
         assert outputs == [("doSpindle", "false"), ("doSpindleCcw", "true"), *off]
@@ -429,6 +432,25 @@ class TestSpindleAndTools:
         _, result = read_val3(Val3({"spindle_speed": "num"}).write(simple_program()))
         assert ("number", ("nSpindle", "12000")) in result.actions
 
+    def test_a_spindle_that_no_output_starts_is_started_by_the_operator(self):
+        events = (
+            Event(0, EventKind.SPINDLE, 5000.0),
+            Event(1, EventKind.COOLANT, 1.0),
+            Event(3, EventKind.SPINDLE, 0.0),
+        )
+        app, result = read_val3(Val3().write(straight_program(3, events=events)))
+        assert not any(name.startswith("do") for name in app.data)
+        start = result.actions.index(("comment", "stop start the spindle: 5000 rev/min clockwise"))
+        assert [kind for kind, _ in result.actions[start + 1 : start + 4]] == ["reset", "operator", "movej"]
+        told = [value for kind, value in result.actions if kind == "comment"]
+        assert "coolant on: no output is named for it" in told and "spindle off: no output is named for it" in told
+        # A drive that a speed starts needs no output; one direction alone does not stand for the other.
+        speed = {"spindle_speed": "aio", "spindle_speed_output": "B\\%A0", "spindle_speed_scale": 0.001}
+        _, result = read_val3(Val3(speed).write(straight_program(3, events=events)))
+        assert ("analog", ("aoSpindle", "5")) in result.actions and "operator" not in dict(result.actions)
+        _, result = read_val3(Val3({"spindle_ccw_output": "B\\%Q1"}).write(straight_program(3, events=events)))
+        assert "operator" in dict(result.actions)
+
     def test_a_later_tool_stops_the_spindle_and_waits(self):
         events = (
             Event(0, EventKind.TOOL, 1.0),
@@ -437,7 +459,7 @@ class TestSpindleAndTools:
             Event(2, EventKind.SPINDLE, 6000.0),
         )
         program = straight_program(4, events=events)
-        _, result = read_val3(Val3({"continue_input": "B\\%I0"}).write(program))
+        _, result = read_val3(Val3({"continue_input": "B\\%I0", "spindle_output": "B\\%Q0"}).write(program))
         assert [v["tool"] for k, v in result.actions if k in MOVES] == ["tTool1"] * 2 + ["tTool2"] * 2
         change = result.actions.index(("comment", "tool 2"))
         assert result.actions[change - 2 : change + 5] == [

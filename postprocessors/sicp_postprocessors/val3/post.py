@@ -162,7 +162,7 @@ class Val3(Val3Words):
         bodies, links = self.bodies(program), self._linking(program)
         # What an aborted run left in the motion queue must not move the arm now.
         head, end = [*self.opening(program), *links, "resetMotion()"], self.closing(program)
-        stop = [*links, *self._stopping(program.path)]
+        stop = [*links, *self._stopping(program)]
         if len(bodies) == 1:
             return {"start": [*head, *bodies[0], *end], "stop": stop}
         parts = {f"move{number:03d}": body for number, body in enumerate(bodies)}
@@ -172,14 +172,14 @@ class Val3(Val3Words):
         """Return the statements that link inputs and outputs, in the dialect whose data do not."""
         if not self._dialect().linked_in_code:
             return []
-        links = linked_variables(program.path, self._switched_links(program), self.options).items()
+        links = linked_variables(self.events(program), self._switched_links(program), self.options).items()
         return [
             f"{variable.type}Link({variable.name},io:{link.removeprefix('io:')})" for variable, link in links if link
         ]
 
-    def _stopping(self, path: ToolPath) -> list[str]:
+    def _stopping(self, program: Program) -> list[str]:
         """Return the statements that the controller runs when the application is stopped: everything off, at once."""
-        kinds = {event.kind for event in path.events}
+        kinds = {event.kind for event in self.events(program)}
         signals = self.spindle_signals() if EventKind.SPINDLE in kinds else ()
         coolant = (self.coolant_signal(),) if EventKind.COOLANT in kinds else ()
         return [line for signal in (*signals, *coolant) if signal for line in self.switch(signal, False)]
@@ -194,13 +194,14 @@ class Val3(Val3Words):
         tool = pose_attributes(options.tool or ZERO, "flange[0]") | {"ioLink": "valve1"}
         numbers, first = np.unique(tools_in_use(path), return_index=True)
         tools = [tool_name(number) for number in numbers[np.argsort(first)].tolist()]
-        links = linked_variables(path, self._switched_links(program), options)
+        events = self.events(program)
+        links = linked_variables(events, self._switched_links(program), options)
         rapid_mm_s = min(options.rapid_mm_s, options.fastest_mm_s)
         return [
             Variable("fPart", "frame", [frame]),
             *(Variable(name, "tool", [tool]) for name in tools),
             *(Variable(each.name, each.type, [{"link": link} if link else {}]) for each, link in links.items()),
-            *other_variables(path, options),
+            *other_variables(events, options),
             *payload_variables(options.payload),
             *speed_variables(
                 self._speeds(path)[1], rapid_mm_s, options, self._dialect(), rapids=bool(path.rapid[1:].any())

@@ -9,7 +9,6 @@ import numpy as np
 from sicp_cam.model import Event, EventKind, FloatArray, IntArray, ToolPath
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.orientations import Six
-from sicp_postprocessors.robot_findings import changes_tool_by_hand
 from sicp_postprocessors.rows import rows, words
 from sicp_postprocessors.val3.options import Val3Options
 from sicp_postprocessors.val3.xml import Dialect, Variable
@@ -120,12 +119,15 @@ def _mdesc(options: Val3Options, *, tmax: str, blend: str, zone: str) -> dict[st
     }
 
 
-def linked_variables(path: ToolPath, switched: Collection[str], options: Val3Options) -> dict[Variable, str]:
+def linked_variables(
+    events: Collection[Event], switched: Collection[str], options: Val3Options
+) -> dict[Variable, str]:
     """Return the variables of inputs and outputs that the statements of the events use, and what they are linked to."""
-    kinds = {event.kind for event in path.events}
+    kinds = {event.kind for event in events}
     links: dict[Variable, str] = {}
     if EventKind.SPINDLE in kinds:
-        links[Variable("doSpindle", "dio")] = options.spindle_output
+        if options.spindle_output:
+            links[Variable("doSpindle", "dio")] = options.spindle_output
         if options.spindle_ccw_output:
             links[Variable("doSpindleCcw", "dio")] = options.spindle_ccw_output
         if options.spindle_speed == "aio":
@@ -133,17 +135,17 @@ def linked_variables(path: ToolPath, switched: Collection[str], options: Val3Opt
     if EventKind.COOLANT in kinds:
         links[Variable("doCoolant", "dio")] = options.coolant_output
     links |= {Variable(name, "dio"): link for link, name in options.user_outputs.items() if link in switched}
-    if options.continue_input and _waits_for_operator(path.events):
+    if options.continue_input and _waits_for_operator(events):
         links[Variable("diContinue", "dio")] = options.continue_input
     return links
 
 
-def other_variables(path: ToolPath, options: Val3Options) -> list[Variable]:
+def other_variables(events: Collection[Event], options: Val3Options) -> list[Variable]:
     """Return the numbers and truth values that the statements of the events use."""
     variables = []
-    if options.spindle_speed == "num" and any(event.kind is EventKind.SPINDLE for event in path.events):
+    if options.spindle_speed == "num" and any(event.kind is EventKind.SPINDLE for event in events):
         variables.append(Variable("nSpindle", "num", [{"value": "0"}]))
-    if not options.continue_input and _waits_for_operator(path.events):
+    if not options.continue_input and _waits_for_operator(events):
         variables.append(Variable("bContinue", "bool", [{"value": "false"}]))
     return variables
 
@@ -162,4 +164,4 @@ def payload_variables(payload: tuple[float, float, float, float] | None) -> list
 
 
 def _waits_for_operator(events: Iterable[Event]) -> bool:
-    return any(event.kind is EventKind.STOP or changes_tool_by_hand(event) for event in events)
+    return any(event.kind is EventKind.STOP for event in events)

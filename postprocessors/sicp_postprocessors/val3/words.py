@@ -60,12 +60,13 @@ class Val3Words(RobotPostprocessor):
             yield "wait(bContinue)"
 
     def spindle_signals(self) -> tuple[str, str]:
-        """Return the names of the spindle's outputs, which are declared also where they are linked later."""
-        return "doSpindle", "doSpindleCcw" if self.options.spindle_ccw_output else ""
+        """Return the names of the spindle's outputs: those that are linked."""
+        options = self.options
+        return "doSpindle" if options.spindle_output else "", "doSpindleCcw" if options.spindle_ccw_output else ""
 
     def coolant_signal(self) -> str:
-        """Return the name of the coolant's output."""
-        return "doCoolant"
+        """Return the name of the coolant's output, if one is linked."""
+        return "doCoolant" if self.options.coolant_output else ""
 
     def spindle_speed(self, rev_min: float) -> Iterator[str]:
         """Return the speed as a number or analog output, where the options ask for it."""
