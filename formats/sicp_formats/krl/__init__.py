@@ -9,8 +9,8 @@ from sicp_cam.errors import FormatError
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_formats.krl.data import Values
-from sicp_formats.krl.run import KrlRunner, Module, Subprogram
-from sicp_formats.krl.text import data_file, without_comment
+from sicp_formats.krl.run import KrlRunner
+from sicp_formats.krl.text import Module, Subprogram, data_file, without_comment
 from sicp_formats.paths.moves import MoveList, check_options
 from sicp_formats.paths.text import program_lines
 from sicp_formats.robot.files import file_beside

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable
 
 from sicp_cam.errors import printable
 from sicp_cam.model import EventKind, FloatArray
-from sicp_formats.krl.data import ASSIGNMENT, Aggregate, Values
+from sicp_formats.krl.data import ASSIGNMENT, Aggregate
+from sicp_formats.krl.text import Module
 from sicp_formats.paths.moves import MoveList
 from sicp_formats.robot.motion import RobotMoves, number_of, pose_zyx
-from sicp_formats.robot.program import Language, RobotError, Runner, Statement, split_arguments, without_strings
+from sicp_formats.robot.program import Language, RobotError, Runner, split_arguments, without_strings
 
-__all__ = ["KrlRunner", "Module", "Subprogram"]
+__all__ = ["KrlRunner"]
 
 _MOVE = re.compile(r"(S?PTP|S?LIN|S?CIRC)(_REL)?(?=[ \t{])[ \t]*(.*)", re.ASCII | re.IGNORECASE)
 _APPROXIMATION = re.compile(r"(?:[ \t]+C_(?:DIS|VEL|ORI|PTP|SPL))+[ \t]*$", re.ASCII | re.IGNORECASE)
@@ -51,24 +50,6 @@ _JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
 _EXTERNAL = ("E1", "E2", "E3", "E4", "E5", "E6")
 _MM_MIN_PER_M_S = 60_000.0
 _MOST_FILES = 1000
-
-
-@dataclass(frozen=True, slots=True)
-class Subprogram:
-    """A subprogram of a file: whether it takes arguments, and its statements."""
-
-    name: str
-    takes_arguments: bool
-    statements: tuple[Statement, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Module:
-    """A .src file: its subprograms by upper-case name, and the values of the variables in the .dat file beside it."""
-
-    file: Path
-    subprograms: Mapping[str, Subprogram]
-    values: Values
 
 
 class KrlRunner(Runner):

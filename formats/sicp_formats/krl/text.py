@@ -1,12 +1,33 @@
-"""The text of KRL: comments, and the data file that belongs to a program."""
+"""The text of KRL: subprograms, comments, and the data file that belongs to a program."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from sicp_formats.robot.program import without_strings
+from sicp_formats.krl.data import Values
+from sicp_formats.robot.program import Statement, without_strings
 
-__all__ = ["data_file", "without_comment"]
+__all__ = ["Module", "Subprogram", "data_file", "without_comment"]
+
+
+@dataclass(frozen=True, slots=True)
+class Subprogram:
+    """A subprogram of a file: whether it takes arguments, and its statements."""
+
+    name: str
+    takes_arguments: bool
+    statements: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    """A .src file: its subprograms by upper-case name, and the values of the variables in the .dat file beside it."""
+
+    file: Path
+    subprograms: Mapping[str, Subprogram]
+    values: Values
 
 
 def without_comment(line: str) -> tuple[str, str]:
