@@ -345,7 +345,8 @@ class GCode(LinePostprocessor):
             words = {"name": f"{listed}_{count}", "number": number, "o": self._control.number.format(number)}
             calls.append(kind.call.format(**words))
             first, last = ([line.format(**words) for line in lines] for lines in (kind.start, kind.end))
-            ends = ["%"] if "%" in self._control.first else []
+            # LinuxCNC finds no subprogram behind a percent sign.
+            ends = ["%"] if kind.numbered else []
             file = f"{stem}_{count}" if kind.numbered else words["name"]
             parts[f"{file}{kind.suffix or self.suffix}"] = [*ends, *first, *body, *last, *ends]
         return {stem + self.suffix: [*self.opening(program), *calls, *self.closing(program)], **parts}
