@@ -122,8 +122,8 @@ DEFECTS = {
         "else",
     ),
     "a loop without bounds": ("cut.pgx", "=1 to x_nTurns", "=1", 861, FAIL, "is no statement", "for l_"),
-    "a bracket too many": ("start.pgx", "movej(pCut[0]", "movej((pCut[0]", 861, FAIL, "in pairs", "movej(("),
-    "a string that stays open": ("cut.pgx", '(at last)"', "(at last)", 861, FAIL, "a string is not closed", "logMsg"),
+    "a bracket too many": ("start.pgx", "movej(pCut[0]", "movej((pCut[0]", 861, FAIL, "open and close in pairs", "movej(("),
+    "a string that stays open": ("cut.pgx", '(at last)"', "(at last)", 861, FAIL, "a string that is not closed", "logMsg"),
     "words of another robot": (
         "start.pgx",
         "  doSpindle=true",

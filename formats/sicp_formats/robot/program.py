@@ -19,6 +19,7 @@ from sicp_formats.paths.moves import MoveList
 __all__ = ["Language", "RobotError", "Runner", "Statement", "split_arguments", "without_strings"]
 
 _STRING = re.compile(r'"[^"]*"?')
+_NESTED = re.compile(r'["(){}]')
 _CALLED = re.compile(r"(?:call[ \t]+)?([A-Za-z_][\w:]*)", re.ASCII)
 _DEEPEST_CALL = 32
 _STATEMENTS_A_POINT = 10
@@ -160,6 +161,10 @@ def split_arguments(text: str, mark: str = ",") -> list[str]:
     >>> split_arguments('p[1,2], {1,2,3}, "a,b"')
     ['p[1,2]', '{1,2,3}', '"a,b"']
     """
+    if not _NESTED.search(text):
+        simple = [part.strip() for part in text.split(mark)]
+        if all(part.count("[") == part.count("]") for part in simple):
+            return simple
     parts, depth, start = [], 0, 0
     plain = without_strings(text)
     for place, character in enumerate(plain):

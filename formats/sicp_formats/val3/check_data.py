@@ -63,24 +63,28 @@ def _check_declaration(application: Application, variable: Variable, element: El
 
 
 def _check_attributes(variable: Variable, key: str, line: int, attributes: Mapping[str, str], report: Report) -> None:
-    known, told = ATTRIBUTES.get(variable.type), f"{printable(variable.name, 40)}[{printable(key, 20)}]"
+    known = ATTRIBUTES.get(variable.type)
     for name, text in attributes.items():
         if known is not None and name not in known and name not in _INNER:
-            message = f"{told}: {_unknown(variable.type, printable(name, 20))}; the default holds instead"
+            message = f"{_named(variable, key)}: {_unknown(variable.type, printable(name, 20))}; the default holds"
             report.add(855, Level.FAIL, message, variable.file, line, kind=f"attribute {name}")
-        elif known is not None and name in known and name not in _WORDS:
-            _check_number(variable, told, name, text, line, report)
-    if variable.type == "num" and number_of(attributes.get("value", "0")) is None:
-        _check_number(variable, told, "value", attributes["value"], line, report)
+        elif (known is not None and name in known and name not in _WORDS) or (variable.type, name) == ("num", "value"):
+            _check_number(variable, key, name, text, line, report)
     if variable.type == "bool" and attributes.get("value", "false") not in ("true", "false"):
-        message = f"{told}: {printable(attributes['value'], 20)!r} is neither true nor false; correct it"
+        told = printable(attributes["value"], 20)
+        message = f"{_named(variable, key)}: {told!r} is neither true nor false; correct it"
         report.add(856, Level.FAIL, message, variable.file, line, kind="bool")
     if variable.type == "mdesc":
-        _check_mdesc(variable, told, line, attributes, report)
+        _check_mdesc(variable, _named(variable, key), line, attributes, report)
     for part, words in CONFIGURATION.items():
         if attributes.get(part, words[0]) not in words:
-            message = f"{told}: {part} = {printable(attributes[part], 20)!r} is none of {', '.join(words)}; correct it"
+            told = f"{part} = {printable(attributes[part], 20)!r}"
+            message = f"{_named(variable, key)}: {told} is none of {', '.join(words)}; correct it"
             report.add(858, Level.FAIL, message, variable.file, line, kind=f"word {part}")
+
+
+def _named(variable: Variable, key: str) -> str:
+    return f"{printable(variable.name, 40)}[{printable(key, 20)}]"
 
 
 def _unknown(kind: str, name: str) -> str:
@@ -91,13 +95,14 @@ def _unknown(kind: str, name: str) -> str:
     return f"a {kind} has no {name}"
 
 
-def _check_number(variable: Variable, told: str, name: str, text: str, line: int, report: Report) -> None:
+def _check_number(variable: Variable, key: str, name: str, text: str, line: int, report: Report) -> None:
     value = number_of(text)
     if value is None:
-        message = f"{told}: {name} = {printable(text, 40)!r} is no number; correct it"
+        message = f"{_named(variable, key)}: {name} = {printable(text, 40)!r} is no number; correct it"
         report.add(856, Level.FAIL, message, variable.file, line, kind="number")
     elif name in _ANGLES and abs(value) > _FULL_TURN:
-        message = f"{told}: {name} = {value:g} degrees is more than a full turn; is it a length, or in other units?"
+        told = f"{_named(variable, key)}: {name} = {value:g} degrees"
+        message = f"{told} is more than a full turn; is it a length, or in other units?"
         report.add(856, Level.WARN, message, variable.file, line, kind="angle")
 
 
@@ -128,8 +133,7 @@ def _check_father(application: Application, variables: Variables, variable: Vari
         text = attributes.get("fatherId", "").strip()
         message = _father_problem(application, variables, variable, key, root, wanted) if text else ""
         if message:
-            told = f"{printable(variable.name, 40)}[{printable(key, 20)}]"
-            what = f"{told} stands in {printable(text, 40)}, {message}"
+            what = f"{_named(variable, key)} stands in {printable(text, 40)}, {message}"
             report.add(859, Level.FAIL, what, variable.file, line, kind=f"father {text}")
         if variable.name == root and any(number_of(attributes.get(each, "0")) for each in ("x", "y", "z", *_ANGLES)):
             what = f"the built-in {root} is given a pose, which it does not take; declare a {wanted} of your own"

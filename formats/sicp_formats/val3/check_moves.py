@@ -10,7 +10,7 @@ from sicp_formats.robot.motion import number_of
 from sicp_formats.robot.program import split_arguments
 from sicp_formats.val3.check_files import Application, Code
 from sicp_formats.val3.check_report import Report
-from sicp_formats.val3.check_syntax import strings_blank
+from sicp_formats.val3.check_syntax import shape_of, strings_blank
 from sicp_formats.val3.check_words import BLENDS, CODE_ATTRIBUTES
 from sicp_formats.val3.data import ITEM
 
@@ -27,14 +27,16 @@ _POSITIVE = frozenset({"vel", "accel", "decel", "tvel", "rvel"})
 def check_moves(application: Application, report: Report) -> None:
     """Check the moves of every program, and the attributes that code reads and sets."""
     for code in application.programs:
+        right: set[str] = set()
         for statement in code.statements:
-            text, line = statement.text, statement.line
-            if text.startswith("//"):
+            text, line, shape = statement.text, statement.line, shape_of(statement.text)
+            if text.startswith("//") or shape in right:
                 continue
             move = MOVE.fullmatch(text)
-            if move:
-                _check_arguments(application, code, move[1], split_arguments(move[2]), line, report)
+            if move and _check_arguments(application, code, move[1], split_arguments(move[2]), line, report):
+                right.add(shape)
             if "." in text:
+                right.discard(shape)
                 _check_attributes(application, code, strings_blank(text), line, report)
 
 
@@ -52,20 +54,24 @@ def _type(application: Application, code: Code, argument: str) -> str | None:
 
 def _check_arguments(
     application: Application, code: Code, word: str, arguments: list[str], line: int, report: Report
-) -> None:
+) -> bool:
+    """Check the arguments of a move; say whether they are right."""
     wanted = ["point", "point"] if word == "movec" else ["point"]
     wanted += ["tool", "mdesc"]
     if len(arguments) != len(wanted):
         message = f"{word} takes {len(wanted)} arguments, and here are {len(arguments)}; correct the line"
         report.add(867, Level.FAIL, message, code.file, line, kind="count")
-        return
+        return False
+    right = True
     for argument, kind in zip(arguments, wanted, strict=True):
         found = _type(application, code, argument)
         fits = found in (None, kind) or (kind == "point" and word == "movej" and found == "joint")
+        right &= fits
         if not fits:
             told, of = printable(argument, 40), printable(found or "", 20)
             message = f"{word} takes a {kind} here, and '{told}' is a {of}; correct the line"
             report.add(867, Level.FAIL, message, code.file, line, kind="type")
+    return right
 
 
 def _check_attributes(application: Application, code: Code, plain: str, line: int, report: Report) -> None:

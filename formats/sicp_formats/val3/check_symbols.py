@@ -11,7 +11,7 @@ from sicp_cam.findings import Level
 from sicp_formats.robot.program import Statement
 from sicp_formats.val3.check_files import Application, Code
 from sicp_formats.val3.check_report import Report
-from sicp_formats.val3.check_syntax import strings_blank
+from sicp_formats.val3.check_syntax import shape_of, strings_blank
 from sicp_formats.val3.check_words import INSTRUCTIONS, KEYWORDS, LITERALS, SCREEN
 
 __all__ = ["check_symbols"]
@@ -51,14 +51,22 @@ def check_symbols(application: Application, report: Report) -> None:
     for code in application.programs:
         own_used: set[str] = set()
         undeclared: set[str] = set()
+        met: set[str] = set()
         for statement in code.statements:
-            if not statement.text.startswith("//"):
-                _check_line(symbols, code, statement, own_used, undeclared)
+            if statement.text.startswith("//"):
+                continue
+            shape = shape_of(statement.text)
+            if shape not in met and _check_line(symbols, code, statement, own_used, undeclared):
+                met.add(shape)
+            for name, index in _INDEXED.findall(strings_blank(statement.text)):
+                _check_index(symbols, code, name, int(index), statement.line)
         _own_unused(code, own_used, report)
     _unused(symbols)
 
 
-def _check_line(symbols: _Symbols, code: Code, statement: Statement, own_used: set[str], undeclared: set[str]) -> None:
+def _check_line(symbols: _Symbols, code: Code, statement: Statement, own_used: set[str], undeclared: set[str]) -> bool:
+    """Check the names in a statement; say whether the next one of its shape needs no look."""
+    known = True
     plain = strings_blank(statement.text)
     called = _CALL.match(plain) or _TASK.match(plain)
     called_at = called.start(1) if called else -1
@@ -69,7 +77,7 @@ def _check_line(symbols: _Symbols, code: Code, statement: Statement, own_used: s
         elif match.start() == called_at:
             problem, level = _program_problem(symbols, name)
         elif bracket and name.lower() not in KEYWORDS:
-            _check_instruction(symbols, code, name, statement.line)
+            known &= _check_instruction(symbols, code, name, statement.line)
             continue
         elif name in code.own:
             own_used.add(name)
@@ -82,8 +90,7 @@ def _check_line(symbols: _Symbols, code: Code, statement: Statement, own_used: s
         if problem and name not in undeclared:
             undeclared.add(name)
             symbols.report.add(864, level, problem, code.file, statement.line, kind=f"symbol {name}")
-    for name, index in _INDEXED.findall(plain):
-        _check_index(symbols, code, name, int(index), statement.line)
+    return known
 
 
 def _library_problem(symbols: _Symbols, name: str) -> str:
@@ -114,14 +121,15 @@ def _variable_problem(symbols: _Symbols, code: Code, name: str) -> tuple[str, Le
     return f"'{printable(name, 40)}' is declared nowhere in the application; declare it in the data", Level.FAIL
 
 
-def _check_instruction(symbols: _Symbols, code: Code, name: str, line: int) -> None:
+def _check_instruction(symbols: _Symbols, code: Code, name: str, line: int) -> bool:
+    """Check the name of an instruction; say whether it is a good one."""
     if name in SCREEN:
         level = Level.INFO if symbols.application.old else Level.WARN
         level = Level.FAIL if symbols.application.version.lower().startswith("s8") else level
         message = f"a CS9 controller has no {name}, an instruction for the screen of a CS8; log or pop up a message"
         symbols.report.add(863, level, message, code.file, line, kind=name)
     elif name in INSTRUCTIONS or name.startswith("$"):
-        return
+        return True
     elif name.lower() in symbols.words:
         message = f"'{printable(name, 40)}' is written {symbols.words[name.lower()]} in VAL3; write it so"
         symbols.report.add(862, Level.WARN, message, code.file, line, kind=name)
@@ -132,6 +140,7 @@ def _check_instruction(symbols: _Symbols, code: Code, name: str, line: int) -> N
     else:
         message = f"'{printable(name, 40)}' is no instruction that is known here; does the controller have it?"
         symbols.report.add(862, Level.WARN, message, code.file, line, kind=name)
+    return False
 
 
 def _check_index(symbols: _Symbols, code: Code, name: str, index: int, line: int) -> None:

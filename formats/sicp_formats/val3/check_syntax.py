@@ -9,9 +9,10 @@ from sicp_cam.findings import Level
 from sicp_formats.val3.check_files import Application, Code
 from sicp_formats.val3.check_report import Report
 
-__all__ = ["check_syntax", "strings_blank"]
+__all__ = ["check_syntax", "shape_of", "strings_blank"]
 
 _STRING = re.compile(r'"[^"]*"')
+_CONSTANT = re.compile(r"\[[0-9]+\]")
 _FIRST_WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _BRACKETS = {")": "(", "]": "[", "}": "{"}
 _OPENS = {"if": "endif", "for": "endfor", "while": "endwhile", "do": "until", "switch": "endswitch"}
@@ -39,9 +40,14 @@ def check_syntax(application: Application, report: Report) -> None:
     """Check every statement of every program by itself, and the blocks that they make."""
     for code in application.programs:
         open_blocks: list[tuple[str, int, str]] = []
+        clean: set[str] = set()
         for statement in code.statements:
-            if not statement.text.startswith("//"):
-                _check_statement(code, statement.text, statement.line, open_blocks, report)
+            shape = shape_of(statement.text)
+            if statement.text.startswith("//") or shape in clean:
+                continue
+            # A move that differs from one before in its index only is as good as that.
+            if _check_statement(code, statement.text, statement.line, open_blocks, report):
+                clean.add(shape)
         for word, line, _ in open_blocks:
             message = f"'{word}' is not closed by {_WRITTEN.get(_OPENS[word], _OPENS[word])}; close it"
             report.add(861, Level.FAIL, message, code.file, line, kind="open")
@@ -56,24 +62,32 @@ def strings_blank(text: str) -> str:
     return _STRING.sub(lambda found: f'"{" " * (len(found[0]) - 2)}"', text) if '"' in text else text
 
 
-def _check_statement(code: Code, text: str, line: int, open_blocks: list[tuple[str, int, str]], report: Report) -> None:
+def shape_of(text: str) -> str:
+    """Return a statement without the indices that are plain numbers: long paths have very few shapes.
+
+    >>> shape_of("movel(pPath[12],tTool,mCut[3])")
+    'movel(pPath[],tTool,mCut[])'
+    """
+    return _CONSTANT.sub("[]", text)
+
+
+def _check_statement(code: Code, text: str, line: int, open_blocks: list[tuple[str, int, str]], report: Report) -> bool:
+    """Check a statement; say whether it is one that stands for itself and that is right."""
     plain = strings_blank(text)
-    told = f"'{printable(text, 60)}'"
+    problem = ""
     if plain.count('"') % 2:
-        report.add(861, Level.FAIL, f"{told}: a string is not closed; close it", code.file, line, kind="string")
-        return
-    if not _balanced(plain):
-        message = f"{told}: brackets do not open and close in pairs; correct them"
-        report.add(861, Level.FAIL, message, code.file, line, kind="brackets")
+        problem = "has a string that is not closed"
+    elif not _balanced(plain):
+        problem = "has brackets that do not open and close in pairs"
     first = _FIRST_WORD.match(plain)
     word = first[0].lower() if first else ""
-    problem = _block_problem(word, line, text, open_blocks)
-    if not problem and not (_FORMS[word] if word in _FORMS else _ALONE if _is_alone(word) else _STATEMENT).fullmatch(
-        plain
-    ):
-        problem = "is no statement of VAL3"
+    block = _block_problem(word, line, text, open_blocks)
+    form = _FORMS[word] if word in _FORMS else _ALONE if _is_alone(word) else _STATEMENT
+    problem = problem or block or ("" if form.fullmatch(plain) else "is no statement of VAL3")
     if problem:
-        report.add(861, Level.FAIL, f"{told} {problem}; correct it", code.file, line, kind="form")
+        message = f"'{printable(text, 60)}' {problem}; correct it"
+        report.add(861, Level.FAIL, message, code.file, line, kind="form")
+    return not problem and word not in _FORMS and not _is_alone(word)
 
 
 def _is_alone(word: str) -> bool:

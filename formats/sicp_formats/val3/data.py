@@ -96,17 +96,14 @@ class Variables:
         """Return a number of an element, or its default where the file leaves it out."""
         variable, line, attributes = self.attributes(name, key)
         text = attributes.get(attribute)
-        if text is None:
-            return default
-        value = number_of(text)
-        if value is None:
-            what = f"{name}[{key}]: {attribute} = {printable(text, 40)!r} is no number; correct it"
-            raise FormatError(variable.file, what, line=line)
-        return value
+        return default if text is None else _number(variable, line, key, attribute, text)
 
     def pose(self, name: str, key: str) -> FloatArray:
         """Return the (4, 4) pose that an element states, in its father."""
-        x, y, z, rx, ry, rz = (self.number(name, key, each, 0.0) for each in _SIX)
+        variable, line, attributes = self.attributes(name, key)
+        x, y, z, rx, ry, rz = (
+            _number(variable, line, key, each, attributes[each]) if each in attributes else 0.0 for each in _SIX
+        )
         return pose_xyz(x, y, z, rx, ry, rz)
 
     def father(self, name: str, key: str) -> tuple[str, str]:
@@ -188,6 +185,14 @@ def _s6(file: Path, data: Element) -> Variable:
     size = _size(file, data, data.attributes.get("size", str(max(len(values), 1))))
     public = data.attributes.get("public", "false") == "true"
     return Variable(data.attributes.get("name", ""), _plain(data.name), size, values, file, data.line, False, public)
+
+
+def _number(variable: Variable, line: int, key: str, attribute: str, text: str) -> float:
+    value = number_of(text)
+    if value is None:
+        what = f"{variable.name}[{key}]: {attribute} = {printable(text, 40)!r} is no number; correct it"
+        raise FormatError(variable.file, what, line=line)
+    return value
 
 
 def _father(element: Element) -> dict[str, str]:

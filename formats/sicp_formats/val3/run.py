@@ -136,8 +136,8 @@ class Val3Runner(Runner):
         tool, speed = arguments[-2:]
         known = [pose for pose in poses if pose is not None]
         self._robot.with_tool(tool, line)
-        if self._file not in self.files:
-            self.files.append(self._file)
+        if not self.files or self.files[-1] is not self._file:
+            self.files = [*dict.fromkeys([*self.files, self._file])]
         if len(known) < len(poses) and word != "movej":
             raise RobotError(f"{word} to joint angles; only movej takes them")
         if not known:

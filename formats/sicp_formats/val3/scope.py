@@ -67,6 +67,8 @@ class Scope:
 
     def whole(self, text: str) -> int:
         """Return the value of a sum of whole numbers: constants, loop counters, sizes and declared numbers."""
+        if text.isdigit() and text.isascii():
+            return int(text)
         total, at = 0, 0
         while at < len(text) or at == 0:
             match = _SUM.match(text, at)
