@@ -219,13 +219,23 @@ class RobotPostprocessor(LinePostprocessor):
         if not np.abs(self.pose_in_world(program)[:3, 3]).max() <= LARGEST:
             words = flag(self.name, "cell", "x,y,z,rx,ry,rz")
             findings.append(Finding(605, Level.FAIL, f"the program frame lies beyond {LARGEST:g} mm; check {words}"))
-        return [*findings, *self._arm_findings(program)] if program.placed else findings
+        return [*findings, *self._arm_findings(program)]
 
     def _arm_findings(self, program: Program) -> list[Finding]:
         """Return what the path asks of the arm, if a model of it is given."""
         path, options, arm = program.path, self.options, self.options.arm()
         if arm is None:
-            return [no_arm_finding(f"name the robot with {flag(self.name, 'robot', 'NAME')}, or a file of it")]
+            return (
+                []
+                if not program.placed
+                else [no_arm_finding(f"name the robot with {flag(self.name, 'robot', 'NAME')}, or a file of it")]
+            )
+        if missing := [name for name in ("tool", "cell") if getattr(options, name) is None]:
+            words = " and ".join(flag(self.name, name, "x,y,z,rx,ry,rz") for name in missing)
+            message = f"what the {arm.name} can reach depends on {' and '.join(missing)}; give {words}, or no robot"
+            return [Finding(664, Level.FAIL, message)]
+        if not program.placed:
+            return []
         T = self.pose_in_world(program)
         stated_mm = getattr(options, "shoulder_height_mm", 0.0)
         told = []

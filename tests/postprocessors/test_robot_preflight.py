@@ -46,6 +46,20 @@ def test_a_path_that_the_robot_can_run_is_written():
     assert [f.level for f in told(ASKED | {"robot": "tx2-90"})] == [Level.INFO, Level.INFO]
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"tool": "0,0,150,0,0,0"}, r"depends on cell; give --set post\.val3\.cell=x,y,z,rx,ry,rz, or no robot"),
+        ({"cell": "550,0,-100,0,0,0"}, r"depends on tool; give --set post\.val3\.tool="),
+        ({}, r"depends on tool and cell; give --set post\.val3\.tool=.* and --set post\.val3\.cell="),
+    ],
+)
+def test_a_robot_without_tool_and_cell_cannot_be_judged(options, words):
+    for program in (loop(), replace(loop(), placed=False)):
+        with pytest.raises(PathError, match=words):
+            Val3(options | ASKED | {"robot": "tx2-90"}).write(program)
+
+
 def test_a_path_out_of_reach_is_refused_with_the_moves():
     with pytest.raises(PathError, match=r"moves \d+ to \d+, lines .*: out of reach of the Staubli TX2-60 by up to"):
         Val3(KNOWN | ASKED | {"robot": "tx2-60"}).write(loop())
