@@ -225,11 +225,8 @@ class RobotPostprocessor(LinePostprocessor):
         """Return what the path asks of the arm, if a model of it is given."""
         path, options, arm = program.path, self.options, self.options.arm()
         if arm is None:
-            return (
-                []
-                if not program.placed
-                else [no_arm_finding(f"name the robot with {flag(self.name, 'robot', 'NAME')}, or a file of it")]
-            )
+            words = flag(self.name, "robot", "NAME")
+            return [no_arm_finding(f"name the robot with {words}, or a file of it")] if program.placed else []
         if missing := [name for name in ("tool", "cell") if getattr(options, name) is None]:
             words = " and ".join(flag(self.name, name, "x,y,z,rx,ry,rz") for name in missing)
             message = f"what the {arm.name} can reach depends on {' and '.join(missing)}; give {words}, or no robot"
