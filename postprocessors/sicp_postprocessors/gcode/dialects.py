@@ -23,7 +23,7 @@ class Subprograms:
     end: tuple[str, ...]
     numbered: bool = False
     suffix: str = ""
-    longest_name: int = 24
+    lower_case: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +60,8 @@ class Dialect:
         Sign of numbers: "" for minus only, "+" for both.
     program
         Lines before and after everything else, `{name}` and `{unit}` within.
+    named
+        True: the program states its name, and its file is called by it.
     number
         Template of the O line, empty where programs have no numbers; `smallest_number` where one must have it.
     tool, spindle, pause, stop
@@ -93,6 +95,7 @@ class Dialect:
     sign: str = ""
     first: tuple[str, ...] = ()
     last: tuple[str, ...] = ("M30",)
+    named: bool = False
     number: str = ""
     smallest_number: int | None = None
     tool: tuple[str, ...] = ("T{tool} M6",)
@@ -149,6 +152,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             inch="G700",
             vector="A3={} B3={} C3={}",
             pause=("G4 F{seconds}",),
+            unnumbered="%;",
             longest_line=512,
             subprograms=Subprograms("{name}", (), ("M17",), suffix=".spf"),
         ),
@@ -163,7 +167,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             ),
             tip_on=MappingProxyType({"rotary": ("M126", "M128"), "vector": ("M128",)}),
             tip_off="M129",
-            suffix=".h",
+            suffix=".H",
             comment="; {}",
             metric="",
             inch=None,
@@ -173,6 +177,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             codes=("L", "L", " R0 FMAX"),
             vector_codes=("LN", "LN", " FMAX"),
             sign="+",
+            named=True,
             first=("BEGIN PGM {name} MM",),
             last=("M30", "END PGM {name} MM"),
             tool=("TOOL CALL {tool} Z",),
@@ -216,7 +221,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             first=("%",),
             last=("M30", "%"),
             largest_inverse=1e7,
-            subprograms=Subprograms("o<{name}> call", ("o<{name}> sub",), ("o<{name}> endsub", "M2"), longest_name=40),
+            subprograms=Subprograms("o<{name}> call", ("o<{name}> sub",), ("o<{name}> endsub", "M2"), lower_case=True),
         ),
         "plain": Dialect(
             family="ISO without tool tip control",

@@ -35,7 +35,7 @@ __all__ = ["GCode"]
 
 _FEED_DECIMALS = {"mm": 3, "inch": 5}
 _VERIFIED_DEG = 1e-4
-_VERIFIED_MM = 1e-3
+_LONGEST_NAME = 20
 _HEAD_LETTERS = {"A": (1.0, 0.0, 0.0), "B": (0.0, 1.0, 0.0), "C": (0.0, 0.0, 1.0)}
 # LinuxCNC acts on comments that begin with these words: it shows them, writes files, runs Python.
 _ACTIVE_COMMENT = re.compile(r"(msg|debug|print|log|probe|py|abort)", re.IGNORECASE)
@@ -306,8 +306,13 @@ class GCode(LinePostprocessor):
         options, control = self.options, self._control
         yield from filter(None, (options.tcp_off or (control.tip_off if options.knows_tip else ""), control.length_off))
 
+    def program_name(self, program: Program) -> str:
+        """Return the name of the file, which is that of the program where it states one."""
+        return self._listed_name(program) if self._control.named else super().program_name(program)
+
     def _listed_name(self, program: Program) -> str:
-        return ascii_name(file_stem(program.name), 24, other="_").upper()
+        plain = re.sub("_+", "_", ascii_name(file_stem(program.name), _LONGEST_NAME, other="_"))
+        return plain.strip("_").upper()
 
     # --- proof, and subprograms ---
 
@@ -337,8 +342,8 @@ class GCode(LinePostprocessor):
         if kind is None:
             raise OutputError(f"post {self.name} has no subprograms for this dialect; leave max_moves_per_program out")
         stem = self.program_name(program)
-        listed = ascii_name(file_stem(program.name), kind.longest_name - 5, other="_")
-        listed = listed.lower() if self._control.family == "LinuxCNC" else listed.upper()
+        listed = self._listed_name(program)
+        listed = listed.lower() if kind.lower_case else listed
         calls, parts = [], {}
         for count, body in enumerate(bodies, 1):
             number = (self.options.number or 0) + count
