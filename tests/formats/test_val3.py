@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from sicp_cam.errors import FormatError, JobError, SicpError, UnitError
+from sicp_cam.findings import Level
 from sicp_cam.limits import Limits
 from sicp_cam.model import Event, EventKind, Program, Status, ToolPath
 from sicp_formats.val3 import read_path
+from sicp_formats.val3.check import check
 from sicp_postprocessors.val3 import Val3
 
 CORPUS = Path(__file__).parents[1] / "corpus" / "val3"
@@ -242,9 +244,18 @@ def program(rows: list[tuple[tuple[float, ...], tuple[float, ...], int, bool]]) 
 
 
 @settings(deadline=None, max_examples=40)
-@given(program=programs(), cell=st.booleans(), split=st.booleans(), transport=st.booleans())
-def test_what_our_post_writes_is_read_back(program: Program, cell: bool, split: bool, transport: bool) -> None:
-    options: dict[str, object] = {"spin": "transport" if transport else "fixed"}
+@given(
+    program=programs(),
+    cell=st.booleans(),
+    split=st.booleans(),
+    transport=st.booleans(),
+    style=st.sampled_from(["split", "per-move", "loop"]),
+    dialect=st.sampled_from(["s7", "s6"]),
+)
+def test_what_our_post_writes_is_read_back(
+    program: Program, cell: bool, split: bool, transport: bool, style: str, dialect: str
+) -> None:
+    options: dict[str, object] = {"spin": "transport" if transport else "fixed", "style": style, "dialect": dialect}
     if cell:
         options["cell"] = (100.0, -20.0, 5.0, 10.0, 20.0, 30.0)
     if split:
@@ -256,6 +267,7 @@ def test_what_our_post_writes_is_read_back(program: Program, cell: bool, split: 
             file.write_bytes(content)
         found = read_path(Path(folder, "round", "round.pjx"), frame="keep")
         in_world = read_path(Path(folder, "round", "round.pjx"))
+        assert [f for f in check(Path(folder, "round")) if f.level is Level.FAIL] == []
     path = program.path
     assert np.abs(found.tips_mm - path.tips_mm).max() <= 1e-3
     sines = np.linalg.norm(np.cross(found.axes, path.axes), axis=1)

@@ -147,6 +147,14 @@ def test_walks_through_loops_come_to_an_end(tmp_path):
     check(folder, limits=Limits(path_points=1000))
 
 
+def test_an_array_of_arrays_is_no_defect(tmp_path):
+    table = '<Data name="nTurns" access="private" xsi:type="array" type="num" size="2,3">'
+    data = DATA.replace('<Data name="nTurns" access="private" xsi:type="array" type="num" size="1">', table)
+    data = data.replace('<Value key="0" value="2" />', '<Value key="0,1" value="2" />')
+    code = START.replace("cut(nTurns)", "cut(nTurns[0,1])")
+    assert bad(checked(tmp_path, cell__dtx=data, start__pgx=program("start", code))) == []
+
+
 def test_what_is_no_application_is_an_error(tmp_path):
     with pytest.raises(FormatError, match=r"one \.pjx"):
         check(tmp_path)

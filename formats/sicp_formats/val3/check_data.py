@@ -181,16 +181,20 @@ def _check_links(variable: Variable, report: Report, linked: set[str] | None) ->
             message = f"{told} is linked to no input or output; link it, as by {variable.type}Link({told},io:bOut0)"
             report.add(860, Level.WARN, message, variable.file, variable.line, kind="none")
         return
-    for key in [str(index) for index in range(variable.size)] if not variable.collection else variable.values:
-        line, attributes = variable.values.get(key, (variable.line, {}))
+    for key, (line, attributes) in variable.values.items():
         link = attributes.get("link", "")
-        told = f"{printable(variable.name, 40)}[{printable(key, 20)}]"
         if not link:
-            message = f"{told} is linked to no input or output; name one such as BasicIO-1\\%Q0"
+            message = f"{_named(variable, key)} is linked to no input or output; name one such as BasicIO-1\\%Q0"
             report.add(860, Level.WARN, message, variable.file, line, kind="none")
         elif "\\" not in link:
-            message = f"{told}: the link {printable(link, 40)!r} has no backslash between board and signal; correct it"
+            told = f"{_named(variable, key)}: the link {printable(link, 40)!r}"
+            message = f"{told} has no backslash between board and signal; correct it"
             report.add(860, Level.WARN, message, variable.file, line, kind="form")
+    without = 0 if variable.collection else variable.size - len(variable.values)
+    if without > 0:
+        told = f"{without} of the {variable.size} elements of {printable(variable.name, 40)} are"
+        message = f"{told} linked to no input or output; name one such as BasicIO-1\\%Q0"
+        report.add(860, Level.WARN, message, variable.file, variable.line, kind="none")
 
 
 def _check_radians(application: Application, report: Report) -> None:

@@ -5,6 +5,7 @@ The manufacturer's tool leaves out what has its default value; the defaults stan
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -36,7 +37,7 @@ _DEEPEST_FRAME = 32
 class Variable:
     """A variable: its type without the suffix of six-axis arms, its size, and the attributes of its elements by key.
 
-    A collection is indexed by texts; `public` variables are seen by other applications.
+    A collection is indexed by other than one number; `public` variables are seen by other applications.
     """
 
     name: str
@@ -167,7 +168,8 @@ def _s7(file: Path, data: Element) -> Variable:
         key = value.attributes.get("key", str(place)).strip()
         values[key] = (value.line, value.attributes)
     size = _size(file, data, data.attributes.get("size", str(max(len(values), 1))))
-    collection = data.attributes.get("xsi:type", "array") == "collection"
+    # Neither the keys of a collection nor those of an array of arrays are plain numbers.
+    collection = data.attributes.get("xsi:type") == "collection" or not data.attributes.get("size", "1").isdecimal()
     public = data.attributes.get("access", "private") == "public"
     return Variable(name, _plain(kind), size, values, file, data.line, collection, public)
 
@@ -202,9 +204,10 @@ def _father(element: Element) -> dict[str, str]:
 
 
 def _size(file: Path, data: Element, text: str) -> int:
-    if not re.fullmatch(r"[0-9]{1,9}", text.strip(), re.ASCII):
+    """Return how many elements an array has; arrays of arrays state several sizes."""
+    if not re.fullmatch(r"[0-9]{1,9}(?:[,;][0-9]{1,9}){0,2}", text.strip(), re.ASCII):
         raise FormatError(file, f"the size {printable(text, 20)!r} is no whole number; correct it", line=data.line)
-    return int(text)
+    return math.prod(int(size) for size in re.split("[,;]", text.strip()))
 
 
 def _plain(kind: str) -> str:

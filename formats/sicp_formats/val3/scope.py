@@ -67,6 +67,8 @@ class Scope:
 
     def whole(self, text: str) -> int:
         """Return the value of a sum of whole numbers: constants, loop counters, sizes and declared numbers."""
+        if text in self.numbers:
+            return self.numbers[text]
         if text.isdigit() and text.isascii():
             return int(text)
         total, at = 0, 0
