@@ -21,6 +21,7 @@ from sicp_cam.model import FloatArray, Program, ToolPath
 from sicp_cam.ranges import Between
 from sicp_postprocessors.base import failures
 from sicp_postprocessors.checks import frame_findings, stretch_findings
+from sicp_postprocessors.moves import tools_in_use
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.options import THIS_POST, flag
 from sicp_postprocessors.orientations import Six, pose_from_six
@@ -29,7 +30,7 @@ from sicp_postprocessors.robot_options import RobotOptions, output_words
 from sicp_postprocessors.self_test import self_test_program
 from sicp_postprocessors.text import ascii_name
 
-__all__ = ["ControllerOptions", "ControllerPostprocessor", "Payload", "labelled"]
+__all__ = ["ControllerOptions", "ControllerPostprocessor", "Payload", "labelled", "tool_numbers"]
 
 Payload = tuple[float, float, float, float]
 """Mass in kg, and centre of gravity x, y, z in the flange in mm."""
@@ -225,6 +226,13 @@ class ControllerPostprocessor(RobotPostprocessor):
         words = flag(self.name, "payload", "KG,X,Y,Z")
         message = f"no payload is stated, and a robot moves worse without it; give it with {words}"
         return [Finding(670, Level.WARN, message)]
+
+
+def tool_numbers(path: ToolPath) -> list[int]:
+    """Return the numbers of the tools of a path, -1 where none is named, in the order in which they come."""
+    tools = tools_in_use(path)
+    numbers: list[int] = tools[np.sort(np.unique(tools, return_index=True)[1])].tolist()
+    return numbers
 
 
 def labelled(values: tuple[float, ...], names: str, decimals: int = 6) -> str:

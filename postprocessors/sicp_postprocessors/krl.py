@@ -17,8 +17,8 @@ import numpy as np
 from sicp_cam.model import FloatArray, Program
 from sicp_cam.ranges import Between
 from sicp_cam.rigid_motion import from_parts
-from sicp_postprocessors.controllers import ControllerOptions, ControllerPostprocessor, labelled
-from sicp_postprocessors.moves import Moves, tools_in_use
+from sicp_postprocessors.controllers import ControllerOptions, ControllerPostprocessor, labelled, tool_numbers
+from sicp_postprocessors.moves import Moves
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.orientations import Six, euler_zyx, rotation_matrices
 from sicp_postprocessors.rows import rows, words
@@ -230,7 +230,7 @@ class Krl(ControllerPostprocessor):
         if options.base_number is None:
             lines += [f"DECL FRAME PART_BASE={_frame(self.pose_in_world(program))}"]
         if options.tool_number is None:
-            tools = dict.fromkeys(_tool_name(number) for number in tools_in_use(program.path).tolist())
+            tools = map(_tool_name, tool_numbers(program.path))
             lines += [f"DECL FRAME {tool}={_frame(self.tool_in_flange())}" for tool in tools]
         if options.payload is not None:
             mass, *centre = options.payload

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from sicp_cam.model import BoolArray, FloatArray, IntArray, Program, ToolPath
 from sicp_cam.rigid_motion import from_parts
-from sicp_postprocessors.controllers import ControllerPostprocessor
-from sicp_postprocessors.moves import Moves, tools_in_use
+from sicp_postprocessors.controllers import ControllerPostprocessor, tool_numbers
+from sicp_postprocessors.moves import Moves
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.orientations import Six, quaternions, rotation_matrices
 from sicp_postprocessors.rapid_options import RapidOptions
@@ -154,7 +154,7 @@ class Rapid(ControllerPostprocessor):
     def _data(self, program: Program) -> Iterator[str]:
         path, options = program.path, self.options
         if not options.tool_name:
-            for tool in dict.fromkeys(self._tool_name(number) for number in tools_in_use(path).tolist()):
+            for tool in map(self._tool_name, tool_numbers(path)):
                 yield f"PERS tooldata {tool}:=[TRUE,{_pose(self.tool_in_flange())},{self._load()}];"
         if not options.wobj_name:
             frames = f"{_pose(self.pose_of_six(options.cell or ZERO))},{_pose(program.T_scan_program)}"

@@ -1,0 +1,69 @@
+MODULE porthole_test
+  PERS tooldata tTool:=[TRUE,[[0,0,150],[1,0,0,0]],[8.5,[0,2,90],[1,0,0,0],0,0,0]];
+  PERS wobjdata wPart:=[FALSE,TRUE,"",[[500,0,200],[0.707106781,0,0,0.707106781]],[[100,-50,25],[0.982550982,0.049708843,-0.099417687,0.14912653]]];
+  CONST speeddata vStart:=[50,500,5000,1000];
+  CONST speeddata vRapid:=[50,500,5000,1000];
+  CONST speeddata vCut0:=[10,500,5000,1000];
+  PROC main()
+    ! porthole_test
+    ! self-test: manual mode, low speed, finger on the stop
+    ! corrected by sicp_cam
+    ! gates: all passed
+    ! not a safety function: verify at reduced speed
+    ! wPart is the pose of the part in the robot's world: the option cell
+    ! times its pose in the scan frame
+    ! points: mm and quaternions, scalar first; tool Z points out of the
+    ! flange into the work
+    ! first run: no blending, no move faster than 50 mm/s
+    ConfL \Off;
+    ConfJ \Off;
+    MoveJ [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vStart,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the tip is at 50 mm above the origin of the frame, along
+    ! its Z
+    TPWrite "stop see that the tip is at 50 mm above";
+    Stop;
+    MoveL [[50.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the tip has moved 50 mm along +X of the frame
+    TPWrite "stop see that the tip has moved 50 mm al";
+    Stop;
+    MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the tip is back
+    TPWrite "stop see that the tip is back";
+    Stop;
+    MoveL [[0.0000,50.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the tip has moved 50 mm along +Y of the frame
+    TPWrite "stop see that the tip has moved 50 mm al";
+    Stop;
+    MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the tip is back
+    TPWrite "stop see that the tip is back";
+    Stop;
+    MoveL [[0.0000,0.0000,50.0000],[0.0000000,0.9914449,0.0000000,-0.1305262],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the holder leans 15 degrees towards +X, the tip has not
+    ! moved
+    TPWrite "stop see that the holder leans 15 degree";
+    Stop;
+    MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the holder is back
+    TPWrite "stop see that the holder is back";
+    Stop;
+    MoveL [[0.0000,0.0000,50.0000],[0.1305262,0.9914449,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the holder leans 15 degrees towards +Y, the tip has not
+    ! moved
+    TPWrite "stop see that the holder leans 15 degree";
+    Stop;
+    MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
+    WaitRob \InPos;
+    ! stop see that the holder is back
+    TPWrite "stop see that the holder is back";
+    Stop;
+  ENDPROC
+ENDMODULE
