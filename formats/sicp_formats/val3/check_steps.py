@@ -40,12 +40,13 @@ class Step:
 class Walker:
     """Where a walk is: the moves so far, programs met and still to be met, and what is known of the variables.
 
-    `left` counts down to the end of the walk; `pending` says that moves wait in the queue, `gap` that what came last is
-    not known; `told` holds the places of which something was told already.
+    `most` moves are kept, and `left` counts statements down to the end of the walk; `pending` says that moves wait in
+    the queue, `gap` that what came last is not known; `told` holds the places of which something was told already.
     """
 
     application: Application
     report: Report
+    most: int
     left: int
     steps: list[Step] = field(default_factory=list)
     stops: set[int] = field(default_factory=set)

@@ -47,7 +47,7 @@ def walk(application: Application, report: Report, most: int) -> tuple[list[Step
     most
         Moves and statements of loops after which the walk ends.
     """
-    walker = Walker(application, report, 4 * most)
+    walker = Walker(application, report, most, 4 * most)
     programs = {code.name.lower(): code for code in application.programs}
     walker.roots = ["start"]
     while walker.roots:
@@ -204,6 +204,9 @@ def _rest(walker: Walker) -> None:
 
 def _move(walker: Walker, code: Code, word: str, arguments: list[str], line: int) -> None:
     walker.pending = True
+    if len(walker.steps) >= walker.most:
+        walker.left = 0
+        return
     pose, father = None, ""
     leave = reach = 0.0
     if len(arguments) >= 3:
