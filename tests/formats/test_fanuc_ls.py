@@ -197,3 +197,9 @@ def test_damaged_programs_give_a_path_or_a_typed_error(data: st.DataObject) -> N
             assert str(error).isprintable()
         else:
             assert np.allclose(np.linalg.norm(path.axes, axis=1), 1)
+
+
+def test_a_number_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    points = "\n".join([point(1, 0), point(2, 9).replace("W = 180.000000", f"W = {'9' * 400}")])
+    with pytest.raises(FormatError, match=r"a\.ls, line \d+: W of P\[2\] is too large to be a number"):
+        read(tmp_path, "L P[1] 9mm/sec FINE\nL P[2] 9mm/sec FINE", points)

@@ -5,6 +5,7 @@ A listing has the sections /PROG, /ATTR, /APPL, /MN with one numbered statement 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -166,4 +167,6 @@ def _values(path: Path, number: int, text: str, line: int) -> dict[str, float]:
         if name in values:
             raise FormatError(path, f"{name} of P[{number}] stands twice; correct it", line=line)
         values[name] = float(value)
+        if not math.isfinite(values[name]):
+            raise FormatError(path, f"{name} of P[{number}] is too large to be a number; correct it", line=line)
     return values

@@ -29,10 +29,11 @@ def check_blends(defects: Defects, moves: list[Blend]) -> None:
 
     Two zones would overlap there, and the controller makes them smaller or stops.
     """
-    for before, move, after in zip([None, *moves[:-1]], moves, [*moves[1:], None], strict=True):
+    for at, move in enumerate(moves):
         if move.zone_mm <= 0.0 or move.tip_mm is None:
             continue
-        ways = [math.dist(move.tip_mm, other.tip_mm) for other in (before, after) if other is not None and other.tip_mm]
+        beside = [*moves[max(at - 1, 0) : at], *moves[at + 1 : at + 2]]
+        ways = [math.dist(move.tip_mm, other.tip_mm) for other in beside if other.tip_mm is not None]
         shortest = min(ways, default=math.inf)
         if move.zone_mm > 0.5 * shortest + _SLACK_MM:
             what = f"the zone of {move.zone_mm:.4g} mm is more than half of the way of {shortest:.4g} mm beside it"
