@@ -57,11 +57,14 @@ def distribution(tmp_path, monkeypatch):
 FORMATS, POSTS = plugin_registry.FORMATS, plugin_registry.POSTPROCESSORS
 
 
+OUR_POSTS = {"apt", "csv", "dxf", "gcode", "krl", "ls", "rapid", "robodk", "same", "ur", "val3"}
+
+
 def test_our_own_readers_and_posts_are_listed_with_their_owner():
     found, findings = plugin_registry.listing()
     ours = {(p.group, p.name): p for p in found if p.owner.startswith("sicp-cam ")}
     assert ours[FORMATS, "scan.ply"].value == "sicp_formats.ply:read_scan"
-    assert {name for group, name in ours if group == POSTS} == {"apt", "csv", "dxf", "gcode", "same", "val3"}
+    assert {name for group, name in ours if group == POSTS} == OUR_POSTS
     assert not [finding for finding in findings if finding.level != "info"]
 
 
@@ -203,7 +206,7 @@ def test_an_unknown_post_is_answered_with_the_nearest():
         plugins.postprocessor("val")
     with pytest.raises(JobError, match=r"no postprocessor 'VAL3'; did you mean val3\?"):
         plugins.postprocessor("VAL3")
-    with pytest.raises(JobError, match="no postprocessor 'XYZ'; known: apt, csv, dxf, gcode, same, val3"):
+    with pytest.raises(JobError, match="no postprocessor 'XYZ'; known: " + ", ".join(sorted(OUR_POSTS))):
         plugins.postprocessor("XYZ")
 
 

@@ -18,6 +18,8 @@ _CONFIGURATION = re.compile(r"[FN] [UD] [TB], ?-?[0-9], ?-?[0-9], ?-?[0-9]")
 class FanucLsOptions(ControllerOptions):
     """Options of the post `ls`. Outputs are DO numbers, or RO3; `pose_angles` = own: W, P, R."""
 
+    pose_angles: Literal["xyz", "own"] = "xyz"
+    """How `tool` and `cell` are turned: R = Rx Ry Rz, or `own`: W, P, R, R = Rz(R) Ry(P) Rx(W)."""
     utool: Annotated[int, Between(1, 29)] = 1
     """Number of the tool frame UTOOL."""
     uframe: Annotated[int, Between(0, 61)] = 1

@@ -51,6 +51,8 @@ _RESERVED = """
 class KrlOptions(ControllerOptions):
     """Options of the post `krl`. Outputs are numbers n of $OUT[n]; `pose_angles` = own: A, B, C."""
 
+    pose_angles: Literal["xyz", "own"] = "xyz"
+    """How `tool` and `cell` are turned: R = Rx Ry Rz, or `own`: A, B, C, R = Rz(A) Ry(B) Rx(C)."""
     tool_number: Annotated[int | None, Between(1, 128)] = None
     """Take tool and load from the controller's TOOL_DATA and LOAD_DATA of this number, in place of `tool`."""
     base_number: Annotated[int | None, Between(1, 128)] = None

@@ -161,8 +161,9 @@ class Rapid(ControllerPostprocessor):
             yield f'PERS wobjdata wPart:=[FALSE,TRUE,"",{frames}];'
         rapid = min(options.rapid_mm_s, options.fastest_mm_s)
         start = min(rapid, self.largest_mm_s * options.approach_percent / 100.0)
-        for name, speed in (("vStart", start), ("vRapid", rapid)):
-            yield f"CONST speeddata {name}:={self._speed(speed)};"
+        yield f"CONST speeddata vStart:={self._speed(start)};"
+        if path.rapid[1:].any():
+            yield f"CONST speeddata vRapid:={self._speed(rapid)};"
         feeds = self._speeds(path)[1].tolist()
         for number, feed in enumerate(feeds if len(feeds) <= _MOST_SPEEDS else ()):
             yield f"CONST speeddata vCut{number}:={self._speed(feed / 60.0)};"

@@ -19,6 +19,8 @@ _CONFIGURATION = re.compile(r"-?[0-9](?:,-?[0-9]){3}")
 class RapidOptions(ControllerOptions):
     """Options of the post `rapid`. Outputs are names of signals; `pose_angles` = own: EZ, EY, EX of the pendant."""
 
+    pose_angles: Literal["xyz", "own"] = "xyz"
+    """How `tool` and `cell` are turned: R = Rx Ry Rz, or `own`: EZ, EY, EX of the pendant, R = Rz Ry Rx."""
     tool_name: str = ""
     """Take tool and load from this tooldata of the controller, in place of `tool`."""
     wobj_name: str = ""

@@ -47,6 +47,8 @@ _RESERVED = """
 class UrScriptOptions(ControllerOptions):
     """Options of the post `ur`. Outputs are 3, configurable_3 or tool_0; `pose_angles` = own: a rotation vector."""
 
+    pose_angles: Literal["xyz", "own"] = "xyz"
+    """How `tool` and `cell` are turned: R = Rx Ry Rz, or `own`: a rotation vector in radians."""
     installation_tcp: bool = False
     """Take tool and payload as the installation has them, in place of `tool` and `payload`."""
     feature: str = ""

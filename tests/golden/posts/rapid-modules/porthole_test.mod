@@ -2,7 +2,6 @@ MODULE porthole_test
   PERS tooldata tTool:=[TRUE,[[0,0,150],[1,0,0,0]],[8.5,[0,2,90],[1,0,0,0],0,0,0]];
   PERS wobjdata wPart:=[FALSE,TRUE,"",[[500,0,200],[0.707106781,0,0,0.707106781]],[[100,-50,25],[0.982550982,0.049708843,-0.099417687,0.14912653]]];
   CONST speeddata vStart:=[50,500,5000,1000];
-  CONST speeddata vRapid:=[50,500,5000,1000];
   CONST speeddata vCut0:=[10,500,5000,1000];
   PROC main()
     ! porthole_test

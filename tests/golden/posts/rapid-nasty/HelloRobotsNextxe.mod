@@ -2,7 +2,6 @@ MODULE HelloRobotsNextxe
   PERS tooldata tTool1:=[TRUE,[[0,0,0],[1,0,0,0]],[0.001,[0,0,0.001],[1,0,0,0],0,0,0]];
   PERS wobjdata wPart:=[FALSE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   CONST speeddata vStart:=[250,500,5000,1000];
-  CONST speeddata vRapid:=[250,500,5000,1000];
   CONST speeddata vCut0:=[10,500,5000,1000];
   PROC main()
     ! Hello "Robots" Next (x) ; % ' ]]> e ?
