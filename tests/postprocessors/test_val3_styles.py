@@ -1,6 +1,7 @@
 """VAL3 in both dialects and all styles: a reader that shares no code, our own reader and our linter agree on it."""
 
 import dataclasses
+import re
 import time
 
 import numpy as np
@@ -299,6 +300,70 @@ class TestEveryProgram:
                 post = Val3(options(dialect, style, first_run=first_run, max_points_per_array=30, **more))
                 folder = folder_of(post.write(program), tmp_path / f"{number}{first_run}")
                 assert {f.code for f in check(folder)} == {859}, check(folder)
+
+
+MADE = {
+    "speed limit of the code in the data": ("dtx", "tmax=", "tvel=", 855),
+    "word of the blend": ("dtx", '"Cartesian"', '"cartesian"', 857),
+    "long name": ("*", "tTool", "tToolOfTheRobot1", 853),
+    "speed not declared": ("dtx", '"mRapid"', '"mFast"', 864),
+    "point beyond the array": ("pgx", "[119]", "[120]", 866),
+    "program not listed": ("pjx", '    <Program file="move000.pgx" />\r\n', "", 852),
+    "blend over half a move": ("dtx", 'leave="0.5" reach="0.5"', 'leave="9" reach="9"', 868),
+    "vel of 0": ("dtx", 'vel="100"', 'vel="0"', 857),
+    "no byte order mark": ("pgx", "\ufeff", "", 851),
+    "LF": ("pgx", "\r\n", "\n", 851),
+    "inches": ("pjx", '"true"', '"false"', 854),
+    "end mark in a comment": ("pgx", "// porthole", "// a ]]> b", 850),
+    "joint 0": ("pgx", "  resetMotion()", "  jHome.j0=1", 864),
+    "frame of no name": ("dtx", '"world[0]"', '"wrld[0]"', 859),
+    "screen of the CS8": ("pgx", "  resetMotion()", "  cls()", 863),
+    "no wait at the end": ("pgx", "  waitEndMove()\r\nend", "end", 869),
+}
+
+
+class TestDefectsOfOthers:
+    """The defects that the tools of others are known to make, each made in a program that the post has written."""
+
+    @pytest.mark.parametrize("defect", MADE)
+    def test_is_found(self, defect, tmp_path):
+        where, old, new, code = MADE[defect]
+        files = Val3(options("s7", "split", max_moves_per_program=60)).write(long_program(cuts=2))
+        broken = {
+            name: content.decode("utf-8").replace(old, new).encode()
+            if where == "*" or name.endswith(where)
+            else content
+            for name, content in files.items()
+        }
+        assert broken != files
+        assert code in {f.code for f in check(folder_of(broken, tmp_path))}
+
+    def test_defaults_that_are_left_out_are_no_defect(self, tmp_path):
+        files = Val3(options("s7", "split")).write(long_program())
+        for default in (b' accel="100"', b' decel="100"', b' rz="0.00000"', b' vel="100"'):
+            assert any(default in content for content in files.values())
+            files = {name: content.replace(default, b"") for name, content in files.items()}
+        folder = folder_of(files, tmp_path)
+        assert {f.code for f in check(folder)} == {859}
+        assert np.abs(read_path(folder, frame="keep").tips_mm - long_program().path.tips_mm).max() < 1e-4
+
+    def test_angles_in_another_order(self, tmp_path):
+        """The tool's X goes round Z of the frame, the pole of Rz Ry Rx: its angles run there, and mean jumps here."""
+        t, lean = np.arange(6) * np.pi / 3, np.radians(1)
+        axes = np.column_stack([np.full(6, np.cos(lean)), np.sin(lean) * np.cos(t), np.sin(lean) * np.sin(t)])
+        path = path_of(np.column_stack([np.arange(6), 0 * t, 0 * t]), axes, 600.0, np.arange(6) == 0)
+        files = Val3({**CELL, "spin": "transport", "spin_deg": 90}).write(program_of(path))
+        assert 858 not in {f.code for f in check(folder_of(files, tmp_path / "right"))}
+        _, result = run(files)
+        turns = iter(Rotation.from_matrix(np.array(result.rotations)).as_euler("ZYX", degrees=True)[:, ::-1].tolist())
+        data = re.sub(
+            r'rx="[^"]*" ry="[^"]*" rz="[^"]*" (?=shoulder)',
+            lambda _: 'rx="{:.5f}" ry="{:.5f}" rz="{:.5f}" '.format(*next(turns)),
+            files["porthole/porthole.dtx"].decode(),
+        )
+        swapped = {**files, "porthole/porthole.dtx": data.encode()}
+        told = [f for f in check(folder_of(swapped, tmp_path / "swapped")) if f.code == 858]
+        assert told and all("in a wrong order" in f.message for f in told)
 
 
 def test_long_paths_are_written_fast():
