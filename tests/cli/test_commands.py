@@ -192,7 +192,7 @@ def test_a_post_is_told_option_by_option(run, files):
     assert lines[0].startswith("gcode: postprocessor, sicp_postprocessors.gcode:GCode, from sicp-cam ")
     assert "  moves: tips, tool axes and feeds" in lines and "  events: comment, coolant" in out
     assert any("[options.post.gcode]" in line for line in lines)
-    at = lines.index("  --set post.gcode.kinematics=...  AC or BC; default AC")
+    at = lines.index("  --set post.gcode.kinematics=...  AC, BC or AB; default AC")
     assert lines[at + 1].startswith("      Head with both rotary axes")
     assert max(map(len, lines)) <= 120
 

@@ -172,7 +172,7 @@ class TestAlong:
 
     def test_no_error_grows_over_many_turns(self):
         axes = leaning_axes(100_000, turn=2000.0)
-        machine = load_machine("head-ac").limited((-1e7, 1e7), None, "")
+        machine = load_machine("head-ac").limited((-1e7, 1e7), None, None)
         angles = angles_along(machine, axes, still(axes), 1e-3)
         assert np.abs(axes_of(machine, angles.deg) - axes).max() < 1e-11
 
@@ -217,14 +217,14 @@ class TestAlong:
 
     def test_the_whole_path_is_wound_into_the_travel(self):
         axes = leaning_axes(500, turn=np.radians(600.0))
-        machine = load_machine("head-bc").limited((-400.0, 300.0), None, "")
+        machine = load_machine("head-bc").limited((-400.0, 300.0), None, None)
         deg = angles_along(machine, axes, still(axes), 1e-3).deg
         assert not over_travel(machine.rotaries[0], deg[:, 0]).any() and np.isclose(np.ptp(deg[:, 0]), 600.0)
 
     def test_rapid_moves_turn_back_where_the_travel_ends(self):
         axes = leaning_axes(3000, turn=36.0)
         rapid = np.arange(3000) % 500 == 0
-        machine = load_machine("head-ac").limited((-360.0, 360.0), None, "")
+        machine = load_machine("head-ac").limited((-360.0, 360.0), None, None)
         deg = angles_along(machine, axes, rapid, 1e-3).deg
         assert not over_travel(machine.rotaries[0], deg[:, 0]).any()
         assert np.abs(np.diff(deg, axis=0))[~rapid[1:]].max() < 1.0
@@ -232,20 +232,20 @@ class TestAlong:
 
     def test_a_cut_is_never_turned_back(self):
         axes = leaning_axes(3000, turn=36.0)
-        machine = load_machine("head-ac").limited((-360.0, 360.0), None, "")
+        machine = load_machine("head-ac").limited((-360.0, 360.0), None, None)
         deg = angles_along(machine, axes, still(axes), 1e-3).deg
         assert np.abs(np.diff(deg, axis=0)).max() < 1.0 and over_travel(machine.rotaries[0], deg[:, 0]).any()
 
     def test_the_solution_that_the_travel_allows_is_taken(self):
         axes = leaning_axes(50, turn=0.5)
-        machine = load_machine("head-ac").limited(None, (-60.0, 5.0), "")
+        machine = load_machine("head-ac").limited(None, (-60.0, 5.0), None)
         angles = angles_along(machine, axes, still(axes), 1e-3)
         assert np.allclose(angles.deg[:, 1], -np.degrees(np.arctan(0.3))) and not angles.forced.any()
         assert error_deg(axes_of(machine, angles.deg), axes) < 1e-6
 
     def test_a_travel_that_makes_the_head_turn_over_within_a_cut_is_told(self):
         axes = leaning_axes(300, turn=3.0)
-        machine = load_machine("head-bc").limited((-100.0, 100.0), None, "")
+        machine = load_machine("head-bc").limited((-100.0, 100.0), None, None)
         angles = angles_along(machine, axes, still(axes), 1e-3)
         assert angles.forced.sum() == 1 and not over_travel(machine.rotaries[0], angles.deg[:, 0]).any()
 

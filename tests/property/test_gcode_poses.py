@@ -51,7 +51,7 @@ def test_poses_are_read_back(case):
     tips, axes = poses(len(case), upwards="nutating" in case)
     rapid = np.arange(COUNT) % 3 == 0
     post = GCode({**options, "check_crossings": False})
-    blocks = read_program(post.write(program_of(path_of(tips, axes, 1200.0, rapid))), post.options.dialect or "fanuc")
+    blocks = read_program(post.write(program_of(path_of(tips, axes, 1200.0, rapid))), options.get("dialect", "fanuc"))
     xyz, turn, feeds, again = blocks.arrays()
     assert np.abs(xyz - tips).max() <= 1e-3
     read = vectors_of(turn) if chain is None else axes_of_words(CHAINS[chain], turn)

@@ -106,7 +106,9 @@ class Machine:
         """Say whether it is known where both axes stand, and not only how they lie."""
         return all(axis.point_mm is not None for axis in self.rotaries)
 
-    def limited(self, first: tuple[float, float] | None, second: tuple[float, float] | None, wrap: str) -> Machine:
+    def limited(
+        self, first: tuple[float, float] | None, second: tuple[float, float] | None, wrap: str | None
+    ) -> Machine:
         """Return the machine with other limits or another way of writing turns, where those are stated."""
         one, two = self.rotaries
         one, two = _limited(one, first, wrap), _limited(two, second, wrap)
@@ -132,7 +134,7 @@ class Machine:
 _WRONG = ("head", "table")
 
 
-def _limited(axis: RotaryAxis, limits: tuple[float, float] | None, wrap: str) -> RotaryAxis:
+def _limited(axis: RotaryAxis, limits: tuple[float, float] | None, wrap: str | None) -> RotaryAxis:
     axis = axis if limits is None else replace(axis, limits_deg=limits)
     # Only what can turn round is written within one turn.
     round_deg = axis.limits_deg[1] - axis.limits_deg[0]

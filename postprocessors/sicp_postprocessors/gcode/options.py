@@ -22,10 +22,10 @@ _NUMBER = Between(1, 99_999_999)
 class GCodeOptions(PreflightOptions):
     """Options of the post `gcode`; empty strings take the words of the dialect."""
 
-    dialect: Literal["", "fanuc", "siemens", "heidenhain", "haas", "linuxcnc", "plain"] = ""
-    """Fanuc G43.4, G43.5, Siemens TRAORI, Heidenhain M128, Haas G234, LinuxCNC; plain: no tip control; empty: fanuc."""
-    orientation: Literal["", "vector", "rotary", "siemens"] = ""
-    """How the tool axis is stated: as a vector, or as two rotary angles; empty: as is usual; siemens: its vector."""
+    dialect: Literal["auto", "fanuc", "siemens", "heidenhain", "haas", "linuxcnc", "plain"] = "auto"
+    """Fanuc G43.4, G43.5, Siemens TRAORI, Heidenhain M128, Haas G234, LinuxCNC; plain: no tip control; auto: fanuc."""
+    orientation: Literal["auto", "vector", "rotary", "siemens"] = "auto"
+    """How the tool axis is stated: as a vector, or as two rotary angles; auto: as is usual; siemens: its vector."""
     kinematics: Literal["AC", "BC", "AB"] = "AC"
     """Head with both rotary axes, the second letter carrying the first; `machine` names any other."""
     machine: str = ""
@@ -36,8 +36,8 @@ class GCodeOptions(PreflightOptions):
     """Words that switch tool tip control on, such as M428; `{tool}` becomes the H word of the tool."""
     tcp_off: str = ""
     """Words that switch tool tip control off: before a tool change and at the end."""
-    tip_control: Literal["", "on", "off"] = ""
-    """Off: X Y Z are written as the machine must move them, which needs its geometry; empty: as the dialect has it."""
+    tip_control: Literal["auto", "on", "off"] = "auto"
+    """Off: X Y Z are written as the machine must move them, which needs its geometry; auto: as the dialect has it."""
     tool_length_mm: Annotated[float | None, Between(0.0, 10_000.0)] = None
     """Length of the tool from the gauge point, for axes in the head without tip control and for linear travel."""
     part_zero_mm: tuple[float, float, float] | None = None
@@ -76,8 +76,8 @@ class GCodeOptions(PreflightOptions):
     """Travel of the rotary axis next to the tool, A or B; none: that of the machine, -180 to 180."""
     turn_limits_deg: tuple[float, float] | None = None
     """Travel of the rotary axis next to the part, mostly C; none: that of the machine, through full turns."""
-    wrap: Literal["", "none", "0..360", "+-180"] = ""
-    """How angles of axes that turn round are written: through full turns, or within one; empty: as the machine does."""
+    wrap: Literal["auto", "none", "0..360", "+-180"] = "auto"
+    """How angles of axes that turn round are written: through full turns, or within one; auto: as the machine does."""
     max_moves_per_program: Annotated[int | None, Between(10, 10_000_000)] = None
     """Divide longer paths into subprograms, at rapid moves; none: one program."""
     split_cuts: bool = False
@@ -90,11 +90,11 @@ class GCodeOptions(PreflightOptions):
             if limits is not None and not limits[0] < limits[1]:
                 low, high = limits
                 problems.append(f"option {name!r} must be a lower and a higher angle, not {low:g}, {high:g}")
-        if self.orientation == "siemens" and self.dialect not in ("", "siemens"):
+        if self.orientation == "siemens" and self.dialect not in ("auto", "siemens"):
             problems.append(f"option 'orientation' siemens is not one of dialect {self.dialect}; set vector or rotary")
         elif self.words not in self.control.orientations:
             known = " or ".join(self.control.orientations)
-            problems.append(f"option 'orientation' must be {known} for dialect {self.dialect or 'fanuc'}")
+            problems.append(f"option 'orientation' must be {known} for dialect {self.dialect_name}")
         else:
             problems += self._meaning_problems()
         if problems:
@@ -103,20 +103,26 @@ class GCodeOptions(PreflightOptions):
     @property
     def control(self) -> Dialect:
         """Words of the chosen dialect, before the options that replace some of them."""
-        named = self.dialect or ("siemens" if self.orientation == "siemens" else "fanuc")
-        return DIALECTS[named]
+        return DIALECTS[self.dialect_name]
+
+    @property
+    def dialect_name(self) -> str:
+        """Name of the chosen dialect."""
+        if self.dialect != "auto":
+            return self.dialect
+        return "siemens" if self.orientation == "siemens" else "fanuc"
 
     @property
     def words(self) -> str:
         """How the tool axis is stated: "vector" or "rotary"."""
         if self.orientation == "siemens":
             return "vector"
-        return self.orientation or next(iter(self.control.orientations))
+        return next(iter(self.control.orientations)) if self.orientation == "auto" else self.orientation
 
     @property
     def knows_tip(self) -> bool:
         """Say whether the control keeps the tip on the path while the axes turn."""
-        return self.control.tip_control if not self.tip_control else self.tip_control == "on"
+        return self.control.tip_control if self.tip_control == "auto" else self.tip_control == "on"
 
     @property
     def states_time(self) -> bool:
@@ -156,13 +162,16 @@ class GCodeOptions(PreflightOptions):
             If it is not known, or with every problem of its file.
         """
         named = self.machine or f"head-{self.kinematics.lower()}"
-        return load_machine(named).limited(self.turn_limits_deg, self.tilt_limits_deg, self.wrap)
+        return load_machine(named).limited(
+            self.turn_limits_deg, self.tilt_limits_deg, None if self.wrap == "auto" else self.wrap
+        )
 
-    def described(self, machine: Machine) -> str:
+    def described(self, machine: Machine | None) -> str:
         """Return family of controls and meaning of the orientation words, for the head of the program."""
         control = self.control
-        words = control.orientations[self.words].format(machine=f"{machine.letters}, {machine.kind}")
-        if not self.knows_tip:
+        words = control.orientations[self.words]
+        words = words if machine is None else words.format(machine=f"{machine.letters}, {machine.kind}")
+        if machine is not None and not self.knows_tip:
             return f"{control.family}: {words}, X Y Z for the geometry of {machine.name}"
         if self.tcp_on:
             return f"tool tip control {' '.join(self.tcp_on.replace('{tool}', '').split())}: {words}"
@@ -181,7 +190,7 @@ class GCodeOptions(PreflightOptions):
         """Return the problems that only options together have."""
         control, told = self.control, []
         if self.program_number is not None and not control.number:
-            told.append(f"option 'program_number' has no meaning for dialect {self.dialect or self.orientation}")
+            told.append(f"option 'program_number' has no meaning for dialect {self.dialect_name}")
         if self.units == "inch" and control.inch is None:
             told.append(f"option 'units' must be mm for dialect {self.dialect}: its controls differ in feeds in inches")
         if self.states_time and control.largest_inverse is None:

@@ -7,13 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from sicp_cam.errors import OutputError, PathError
+from sicp_cam.errors import OutputError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import FloatArray, Program, ToolPath
 from sicp_cam.units import mm_per_unit
 from sicp_postprocessors.base import failures
-from sicp_postprocessors.checks import frame_findings, frame_name, move_place
-from sicp_postprocessors.gcode.feeds import INVERSE_DECIMALS, feeds_of
+from sicp_postprocessors.checks import frame_findings, frame_name
+from sicp_postprocessors.gcode.blocks import block_texts, numbered
+from sicp_postprocessors.gcode.feeds import feeds_of
 from sicp_postprocessors.gcode.findings import (
     control_findings,
     division_findings,
@@ -25,17 +26,17 @@ from sicp_postprocessors.gcode.findings import (
 from sicp_postprocessors.gcode.machine import Machine
 from sicp_postprocessors.gcode.options import GCodeOptions
 from sicp_postprocessors.gcode.positions import Positions, Setting, positions_of
+from sicp_postprocessors.gcode.proof import prove
+from sicp_postprocessors.gcode.subprograms import with_subprograms
 from sicp_postprocessors.numbers import fixed, trimmed
-from sicp_postprocessors.options import flag
-from sicp_postprocessors.rows import rows
 from sicp_postprocessors.template import LinePostprocessor, Moves
 from sicp_postprocessors.text import ascii_name, file_stem, pose_words
 
 __all__ = ["GCode"]
 
-_FEED_DECIMALS = {"mm": 3, "inch": 5}
-_VERIFIED_DEG = 1e-4
 _LONGEST_NAME = 20
+_READ_CONE_DEG = 0.001
+"""Reading back asks for axes as good as this."""
 _HEAD_LETTERS = {"A": (1.0, 0.0, 0.0), "B": (0.0, 1.0, 0.0), "C": (0.0, 0.0, 1.0)}
 # LinuxCNC acts on comments that begin with these words: it shows them, writes files, runs Python.
 _ACTIVE_COMMENT = re.compile(r"(msg|debug|print|log|probe|py|abort)", re.IGNORECASE)
@@ -130,14 +131,15 @@ class GCode(LinePostprocessor):
             If forward kinematics of the written words do not give tip and axis back.
         """
         positions = self.positions(program)
-        self._verify(program, positions)
-        whole = positions.program
+        prove(program, positions, self.options)
+        whole, kind = positions.program, self._control.subprograms
         self._last = (whole, positions)
-        bodies = self.bodies(whole)
-        if len(bodies) == 1:
-            files = {self.program_name(whole) + self.suffix: [*self.opening(whole), *bodies[0], *self.closing(whole)]}
-        else:
-            files = self._with_subprograms(whole, bodies)
+        bodies, stem = self.bodies(whole), self.program_name(whole)
+        calls, parts = bodies[0], dict[str, list[str]]()
+        if len(bodies) > 1 and kind is not None:
+            names = (stem, self._listed_name(whole))
+            calls, parts = with_subprograms(self._control, kind, names, self.options.number or 0, bodies)
+        files = {stem + self.suffix: [*self.opening(whole), *calls, *self.closing(whole)], **parts}
         self._last = (program, positions)
         return {file: self.encoded(lines) for file, lines in files.items()}
 
@@ -156,7 +158,7 @@ class GCode(LinePostprocessor):
         options = self.options
         dwell = "milliseconds" if options.dwell == "P_MS" else "seconds"
         offset = f"work offset {options.work_offset}" if options.work_offset else "active work offset"
-        yield options.described(self._machine())
+        yield options.described(self._turning())
         yield f"units {options.units}, dwell in {dwell}"
         if options.states_time:
             yield "feeds as inverse time"
@@ -173,8 +175,8 @@ class GCode(LinePostprocessor):
         origin = f"program zero at {zero} mm in the machine" if zero else ""
         return f"valid for {' and '.join(part for part in (length, origin) if part)} only"
 
-    def _machine(self) -> Machine:
-        return self._setting.machine if self._setting is not None else self.options.rotaries()
+    def _turning(self) -> Machine | None:
+        return self._setting.machine if self._setting is not None else None
 
     def setup(self, program: Program) -> Iterator[str]:
         """Return the modes that the program relies on."""
@@ -199,11 +201,11 @@ class GCode(LinePostprocessor):
 
     def move_joint(self, moves: Moves) -> list[str]:
         """Return rapid blocks."""
-        return self._blocks(moves, rapid=True)
+        return block_texts(moves, self.options, self._turning(), rapid=True)
 
     def move_linear(self, moves: Moves) -> list[str]:
         """Return cutting blocks; the feed stands where it changes, and after every rapid move."""
-        return self._blocks(moves, rapid=False)
+        return block_texts(moves, self.options, self._turning(), rapid=False)
 
     def spindle(self, rev_min: float) -> Iterator[str]:
         """Return the words of a spindle speed."""
@@ -246,52 +248,10 @@ class GCode(LinePostprocessor):
         return feeds_of(self._last[1], self.options)
 
     def assemble(self, lines: Iterable[str]) -> Iterator[str]:
-        """Return the lines with numbered blocks; numbers begin again where the control has no larger ones."""
-        control, step = self._control, self.options.line_numbers
-        lines = _with_speeds(lines) if control.always_numbered else lines
-        number = -1 if control.always_numbered else 0
-        for line in lines:
-            if len(line) > control.longest_line:
-                raise OutputError(f"post {self.name} wrote a line of {len(line)} characters; choose fewer decimals")
-            if control.always_numbered:
-                number += 1
-            elif not step or line[0] in control.unnumbered:
-                yield line
-                continue
-            else:
-                number = number + step if number + step <= control.largest_number else step
-            yield control.block_number.format(number) + line
+        """Return the lines with their block numbers."""
+        return numbered(lines, self._control, self.options.line_numbers)
 
     # --- words ---
-
-    def _blocks(self, moves: Moves, *, rapid: bool) -> list[str]:
-        options, control = self.options, self._control
-        place = f"{{:{control.sign}.{options.position_decimals}}}"
-        tips = f"X{place} Y{place} Z{place}"
-        columns = list(moves.targets.T)
-        if self._setting is None:
-            count = control.vector.count("{}")
-            turn = control.vector.format(*[f"{{:{control.sign}.{options.axis_decimals}}}"] * count)
-            columns = columns[:3] + columns[3:] * (count // 3)
-        else:
-            letters = sorted(axis.letter for axis in self._setting.machine.rotaries)
-            turn = " ".join(f"{letter}{{:{control.sign}.{options.angle_decimals}}}" for letter in letters)
-        codes = control.codes if self._setting is not None else control.vector_codes or control.codes
-        feed, code, end = "", codes[0 if rapid else 1], codes[2] if rapid else ""
-        if not rapid and options.states_time:
-            feed = f" F{{:.{INVERSE_DECIMALS}t}}"
-            columns.append(moves.feeds_mm_min)
-        elif not rapid:
-            feed = "{}"
-            columns.append(self._feed_words(moves))
-        return rows(control.block.format(code=code, tips=tips, turn=turn, feed=feed, end=end), *columns)
-
-    def _feed_words(self, moves: Moves) -> np.ndarray[tuple[int], np.dtype[np.bytes_]]:
-        stated = np.flatnonzero(moves.states_feed)
-        texts = rows(f" F{{:.{_FEED_DECIMALS[self.options.units]}t}}", moves.feeds_mm_min[stated])
-        column = np.zeros(len(moves), f"S{max(map(len, texts), default=1)}")
-        column[stated] = texts
-        return column
 
     def _tip_on(self, tool: int) -> Iterator[str]:
         options, control = self.options, self._control
@@ -313,68 +273,3 @@ class GCode(LinePostprocessor):
     def _listed_name(self, program: Program) -> str:
         plain = re.sub("_+", "_", ascii_name(file_stem(program.name), _LONGEST_NAME, other="_"))
         return plain.strip("_").upper()
-
-    # --- proof, and subprograms ---
-
-    def _verify(self, program: Program, positions: Positions) -> None:
-        options, cone = self.options, self.options.singular_cone_deg
-        decimals = options.angle_decimals if self._setting is not None else options.axis_decimals
-        precision = max(_VERIFIED_DEG, (1.0 if self._setting is not None else 60.0) * 10.0**-decimals)
-        held = 0.0 if positions.angles is None else np.where(positions.angles.held, cone, 0.0)
-        off_axis = positions.axis_errors_deg > precision + held
-        off_tip = positions.tip_errors_mm > mm_per_unit(options.units) * 10.0**-options.position_decimals
-        wrong = off_axis | off_tip
-        if wrong.any():
-            move = int(np.argmax(wrong))
-            missed = (
-                f"tool axis by {positions.axis_errors_deg[move]:.5f} degrees"
-                if off_axis[move]
-                else f"tip by {positions.tip_errors_mm[move]:.5f} mm"
-            )
-            raise PathError(
-                f"post {self.name}, {move_place(program.path, int(positions.origin[move]))}: the words miss the "
-                f"{missed}; set {flag(self.name, 'orientation', 'vector')} and report this"
-            )
-
-    def _with_subprograms(self, program: Program, bodies: list[list[str]]) -> dict[str, list[str]]:
-        """Return the lines of a main program that calls its parts, and of each part, by file name."""
-        kind = self._control.subprograms
-        if kind is None:
-            raise OutputError(f"post {self.name} has no subprograms for this dialect; leave max_moves_per_program out")
-        stem = self.program_name(program)
-        listed = self._listed_name(program)
-        listed = listed.lower() if kind.lower_case else listed
-        calls, parts = [], {}
-        for count, body in enumerate(bodies, 1):
-            number = (self.options.number or 0) + count
-            words = {"name": f"{listed}_{count}", "number": number, "o": self._control.number.format(number)}
-            calls.append(kind.call.format(**words))
-            first, last = ([line.format(**words) for line in lines] for lines in (kind.start, kind.end))
-            # LinuxCNC finds no subprogram behind a percent sign.
-            ends = ["%"] if kind.numbered else []
-            file = f"{stem}_{count}" if kind.numbered else words["name"]
-            parts[f"{file}{kind.suffix or self.suffix}"] = [*ends, *first, *body, *last, *ends]
-        return {stem + self.suffix: [*self.opening(program), *calls, *self.closing(program)], **parts}
-
-
-_READ_CONE_DEG = 0.001
-"""Reading back asks for axes as good as this."""
-
-
-def _with_speeds(lines: Iterable[str]) -> Iterator[str]:
-    """Join the speed of a spindle to the tool call right before it: `TOOL CALL 3 Z S12000`."""
-    waiting: list[str] = []
-    for line in lines:
-        if line.startswith("TOOL CALL S") and waiting:
-            waiting[0] += line.removeprefix("TOOL CALL")
-            continue
-        if line.startswith("TOOL CALL ") and not line.startswith("TOOL CALL S"):
-            yield from waiting
-            waiting = [line]
-        elif waiting and line.startswith(("; ", "M126", "M128", "FUNCTION TCPM")):
-            waiting.append(line)
-        else:
-            yield from waiting
-            waiting = []
-            yield line
-    yield from waiting

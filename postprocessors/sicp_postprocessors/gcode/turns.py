@@ -42,7 +42,7 @@ def turn_range(axis: RotaryAxis, lowest: float, highest: float) -> range:
     """Return the numbers of turns by which angles from lowest to highest can be wound within the travel of an axis.
 
     >>> axis = RotaryAxis("C", (0.0, 0.0, 1.0), "head", limits_deg=(-360.0, 360.0))
-    >>> list(turn_range(axis, -10.0, 200.0)), list(turn_range(axis, -10.0, 800.0))
+    >>> list(turn_range(axis, 10.0, 200.0)), list(turn_range(axis, -10.0, 800.0))
     ([-1, 0], [])
     """
     if axis.wrap != "none" or not axis.turns_on:

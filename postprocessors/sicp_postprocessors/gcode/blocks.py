@@ -1,0 +1,113 @@
+"""The text of moves: columns of numbers into blocks of a dialect, and block numbers before them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from sicp_cam.errors import OutputError
+from sicp_postprocessors.gcode.dialects import Dialect
+from sicp_postprocessors.gcode.feeds import INVERSE_DECIMALS
+from sicp_postprocessors.gcode.machine import Machine
+from sicp_postprocessors.gcode.options import GCodeOptions
+from sicp_postprocessors.moves import Moves
+from sicp_postprocessors.rows import rows
+
+__all__ = ["block_texts", "numbered"]
+
+_FEED_DECIMALS = {"mm": 3, "inch": 5}
+
+
+def block_texts(moves: Moves, options: GCodeOptions, machine: Machine | None, *, rapid: bool) -> list[str]:
+    """Return one block for each move: its code, X Y Z, the words of the tool axis, and the feed where it is stated.
+
+    Parameters
+    ----------
+    moves
+        Their `targets` hold X, Y, Z and the numbers of the tool axis; their `feeds_mm_min` the numbers behind F.
+    options
+        Dialect and decimals.
+    machine
+        Whose rotary axes are stated; None for vectors.
+    rapid
+        Whether these are rapid moves.
+    """
+    control = options.control
+    place = f"{{:{control.sign}.{options.position_decimals}}}"
+    columns = list(moves.targets.T)
+    if machine is None:
+        codes, count = control.vector_codes or control.codes, control.vector.count("{}")
+        turn = control.vector.format(*[f"{{:{control.sign}.{options.axis_decimals}}}"] * count)
+        columns = columns[:3] + columns[3:] * (count // 3)
+    else:
+        codes, letters = control.codes, sorted(axis.letter for axis in machine.rotaries)
+        turn = " ".join(f"{letter}{{:{control.sign}.{options.angle_decimals}}}" for letter in letters)
+    code, feed, end = codes[1], "", ""
+    if rapid:
+        code, end = codes[0], codes[2]
+    elif options.states_time:
+        feed = f" F{{:.{INVERSE_DECIMALS}t}}"
+        columns.append(moves.feeds_mm_min)
+    else:
+        feed = "{}"
+        columns.append(_feed_words(moves, _FEED_DECIMALS[options.units]))
+    tips = f"X{place} Y{place} Z{place}"
+    return rows(control.block.format(code=code, tips=tips, turn=turn, feed=feed, end=end), *columns)
+
+
+def numbered(lines: Iterable[str], control: Dialect, step: int) -> Iterator[str]:
+    """Return lines with block numbers; numbers begin again where the control has no larger ones.
+
+    Raises
+    ------
+    OutputError
+        If a line is longer than the control reads.
+
+    >>> from sicp_postprocessors.gcode.dialects import DIALECTS
+    >>> list(numbered(["%", "G90", "(x)", "M30"], DIALECTS["fanuc"], 10))
+    ['%', 'N10 G90', '(x)', 'N20 M30']
+    """
+    number = -1 if control.always_numbered else 0
+    for line in _with_speeds(lines) if control.always_numbered else lines:
+        if len(line) > control.longest_line:
+            raise OutputError(
+                f"a block has {len(line)} characters, more than {control.family} reads; write fewer decimals"
+            )
+        if control.always_numbered:
+            number += 1
+        elif not step or line[0] in control.unnumbered:
+            yield line
+            continue
+        else:
+            number = number + step if number + step <= control.largest_number else step
+        yield control.block_number.format(number) + line
+
+
+def _feed_words(moves: Moves, decimals: int) -> npt.NDArray[np.bytes_]:
+    stated = np.flatnonzero(moves.states_feed)
+    texts = rows(f" F{{:.{decimals}t}}", moves.feeds_mm_min[stated])
+    column = np.zeros(len(moves), f"S{max(map(len, texts), default=1)}")
+    column[stated] = texts
+    return column
+
+
+def _with_speeds(lines: Iterable[str]) -> Iterator[str]:
+    """Join the speed of a spindle to the tool call before it, where nothing moves between: `TOOL CALL 3 Z S12000`."""
+    waiting: list[str] = []
+    for line in lines:
+        if line.startswith("TOOL CALL S") and waiting:
+            waiting[0] += line.removeprefix("TOOL CALL")
+            yield from waiting
+            waiting = []
+        elif line.startswith("TOOL CALL ") and not line.startswith("TOOL CALL S"):
+            yield from waiting
+            waiting = [line]
+        elif waiting and line.startswith(("; ", "M126", "M128", "FUNCTION TCPM")):
+            waiting.append(line)
+        else:
+            yield from waiting
+            waiting = []
+            yield line
+    yield from waiting
