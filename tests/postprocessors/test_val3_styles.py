@@ -348,11 +348,11 @@ class TestDefectsOfOthers:
         assert np.abs(read_path(folder, frame="keep").tips_mm - long_program().path.tips_mm).max() < 1e-4
 
     def test_angles_in_another_order(self, tmp_path):
-        """The tool's X goes round Z of the frame, the pole of Rz Ry Rx: its angles run there, and mean jumps here."""
+        """The tool's X passes close to Z of the frame, the pole of Rz Ry Rx: its angles swing there, and jump here."""
         t, lean = np.arange(6) * np.pi / 3, np.radians(1)
         axes = np.column_stack([np.full(6, np.cos(lean)), np.sin(lean) * np.cos(t), np.sin(lean) * np.sin(t)])
         path = path_of(np.column_stack([np.arange(6), 0 * t, 0 * t]), axes, 600.0, np.arange(6) == 0)
-        files = Val3({**CELL, "spin": "transport", "spin_deg": 90}).write(program_of(path))
+        files = Val3({**CELL, "spin": "transport", "spin_deg": 90.3}).write(program_of(path))
         assert 858 not in {f.code for f in check(folder_of(files, tmp_path / "right"))}
         _, result = run(files)
         turns = iter(Rotation.from_matrix(np.array(result.rotations)).as_euler("ZYX", degrees=True)[:, ::-1].tolist())
