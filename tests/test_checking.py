@@ -183,18 +183,8 @@ def test_a_checker_that_answers_anything_else_is_named(third_party):
 
 
 def test_parts_of_a_long_program_are_checked_with_the_program_that_calls_them(tmp_path):
-    names = [
-        "trim.src",
-        "trim_001.src",
-        "trim_002.src",
-        "door.pgf",
-        "door.mod",
-        "door_001.mod",
-        "X.ls",
-        "X001.ls",
-        "op_100.apt",
-    ]
-    (tmp_path / "result.json").write_text(
-        json.dumps({"outputs": [{"kind": "program", "path": name} for name in names]})
-    )
-    assert [file.name for file in programs_of(tmp_path)] == ["X.ls", "door.pgf", "op_100.apt", "trim.src"]
+    names = ["trim.src", "trim_001.src", "trim_002.src", "door.pgf", "door.mod", "door_001.mod", "door.src", "X.ls"]
+    names += ["X001.ls", "op_100.apt"]
+    outputs = [{"kind": "program", "path": name} for name in names]
+    (tmp_path / "result.json").write_text(json.dumps({"outputs": outputs}))
+    assert [each.name for each in programs_of(tmp_path)] == ["X.ls", "door.pgf", "door.src", "op_100.apt", "trim.src"]
