@@ -159,6 +159,18 @@ class TestWords:
         assert warning.level is Level.WARN and "--set post.gcode.tcp_on=M428" in warning.message
         assert not told({"dialect": "linuxcnc", "tcp_on": "M428"}, simple_program(), 626)
 
+    @pytest.mark.parametrize(("name", "file"), [("2nd tür", "PR_P2ndtur"), ("x", "PR_x"), ("a-b_c", "ab_c")])
+    def test_siemens_names_begin_with_two_letters(self, name, file):
+        program = program_of(simple_program().path, name=name)
+        (written,) = GCode({"dialect": "siemens"}).write(program)
+        assert written == f"{file}.mpf"
+
+    def test_what_reads_the_programs_back_is_told_the_axes(self):
+        assert GCode({"dialect": "haas", "machine": "table-bc"}).reading() == {"rotary": "BC"}
+        assert GCode({"dialect": "siemens"}).reading() == {}
+        for options in ({"dialect": "heidenhain"}, {"dialect": "haas", "machine": "nutating-head-bc"}, PLAIN):
+            assert isinstance(GCode(options).reading(), str)
+
     def test_block_numbers_begin_again(self):
         lines = lines_of({"line_numbers": 100}, straight_program(1200))
         numbers = [int(line[1:].split()[0]) for line in lines if line[0] == "N"]
@@ -362,6 +374,17 @@ class TestWithoutTipControl:
         ):
             post.write(program)
 
+    def test_one_length_does_for_one_tool_only(self, tmp_path):
+        fork = tmp_path / "fork.toml"
+        axis = '[[rotary]]\nletter = "{}"\non = "head"\ndirection = {}\npivot_mm = {}\n'
+        text = 'name = "fork"\n' + axis.format("C", [0, 0, 1], 0) + axis.format("B", [0, 1, 0], 200)
+        fork.write_text(text, "ascii")
+        options = {"dialect": "plain", "machine": str(fork), "tool_length_mm": 100}
+        tools = tuple(Event(move, EventKind.TOOL, float(move + 1)) for move in (0, 1))
+        assert GCode(options).write(straight_program(3, events=tools[:1]))
+        with pytest.raises(PathError, match="X Y Z hold for one length"):
+            GCode(options).write(straight_program(3, events=tools))
+
     def test_the_first_cut_has_no_time(self):
         program = program_of(path_of(np.eye(2, 3), leaning_axes(2), 600.0, False))
         with pytest.raises(PathError, match="move 0, line 10: the path begins with a cutting move"):
@@ -406,7 +429,7 @@ class TestSubprograms:
             ({"program_number": 100}, ["Übung 5.nc", "Übung 5_1.nc"], ["M98 P101", "M98 P102"],
              ["%", "O0101"], ["M99", "%"]),
             ({"dialect": "haas"}, ["Übung 5.nc", "Übung 5_1.nc"], ["M98 P2", "M98 P3"], ["%", "O00002"], ["M99", "%"]),
-            ({"dialect": "siemens"}, ["Übung 5.mpf", "UBUNG5_1.spf"], ["UBUNG5_1", "UBUNG5_2"], [], ["M17"]),
+            ({"dialect": "siemens"}, ["Ubung5.mpf", "Ubung5_1.spf"], ["Ubung5_1", "Ubung5_2"], [], ["M17"]),
             ({"dialect": "linuxcnc"}, ["Übung 5.ngc", "ubung5_1.ngc"], ["o<ubung5_1> call", "o<ubung5_2> call"],
              ["o<ubung5_1> sub"], ["o<ubung5_1> endsub", "M2"]),
         ],

@@ -32,16 +32,26 @@ limits_deg = [-120, 120]
 """
 
 
+INI = """[RS274NGC]
+SUBROUTINE_PATH = {0}
+REMAP = M428 modalgroup=10 ngc=site428
+REMAP = M429 modalgroup=10 ngc=site429
+"""
+
+
 def interpreted(program, folder, **options):
     """Return the canonical calls of the interpreter, [(name, arguments)], for a program as it is written."""
     files = GCode({"dialect": "linuxcnc", **options}).write(program)
     (folder / "tool.tbl").write_text("T1 P1 Z50 D6\nT3 P3 Z120.5 D6\n", "ascii")
     (folder / "all.var").write_text("", "ascii")
-    (folder / "all.ini").write_text(f"[RS274NGC]\nSUBROUTINE_PATH = {folder}\n", "ascii")
+    (folder / "all.ini").write_text(INI.format(folder), "ascii")
     for file, content in files.items():
         (folder / file).write_bytes(content)
     main = folder / GCode({"dialect": "linuxcnc"}).main_file(files)
     command = ["rs274", "-g", "-v", folder / "all.var", "-t", folder / "tool.tbl"]
+    for code in (428, 429):
+        text = f"o<site{code}> sub\n(kinematics {code})\no<site{code}> endsub [1]\nM2\n"
+        (folder / f"site{code}.ngc").write_text(text, "ascii")
     # The folder of the program is that of its subprograms, as it is set up on a machine.
     command += ["-i", folder / "all.ini", main]
     ran = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, check=False)
@@ -161,3 +171,11 @@ def test_subprograms_are_found_and_run(tmp_path):
     calls = interpreted(program, tmp_path, max_moves_per_program=20)
     positions, _ = moves_of(calls)
     assert np.allclose(positions[:, :3], tips) and ("COMMENT", '"half way"') in calls
+
+
+def test_the_words_of_the_site_switch_its_kinematics_around_the_moves(tmp_path):
+    calls = interpreted(simple_program(), tmp_path, tcp_on="M428", tcp_off="M429")
+    told = [a.strip('"') if name == "COMMENT" else name for name, a in calls]
+    on, moves = told.index("kinematics 428"), [i for i, name in enumerate(told) if name.startswith("STRAIGHT")]
+    assert told.index("CHANGE_TOOL") < on < moves[0] and told[moves[-1] :].count("kinematics 429") == 1
+    assert np.allclose(moves_of(calls)[0][:, :3], simple_program().path.tips_mm, atol=1e-4)

@@ -61,7 +61,10 @@ class Dialect:
     program
         Lines before and after everything else, `{name}` and `{unit}` within.
     named
-        True: the program states its name, and its file is called by it.
+        "plain" or "upper": names hold letters, digits and underscores only, as they are or in capitals, and the file is
+        called like the program; empty where the control takes the name of any file.
+    readable
+        False: no reader of ours knows the language.
     number
         Template of the O line, empty where programs have no numbers; `smallest_number` where one must have it.
     tool, spindle, pause, stop
@@ -95,7 +98,8 @@ class Dialect:
     sign: str = ""
     first: tuple[str, ...] = ()
     last: tuple[str, ...] = ("M30",)
-    named: bool = False
+    named: str = ""
+    readable: bool = True
     number: str = ""
     smallest_number: int | None = None
     tool: tuple[str, ...] = ("T{tool} M6",)
@@ -147,6 +151,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             tip_on=MappingProxyType({"vector": ("TRAORI", "ORIWKS ORIVECT"), "rotary": ("TRAORI", "ORIWKS ORIAXES")}),
             tip_off="TRAFOOF",
             suffix=".mpf",
+            named="plain",
             comment="; {}",
             metric="G710",
             inch="G700",
@@ -177,7 +182,8 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             codes=("L", "L", " R0 FMAX"),
             vector_codes=("LN", "LN", " FMAX"),
             sign="+",
-            named=True,
+            named="upper",
+            readable=False,
             first=("BEGIN PGM {name} MM",),
             last=("M30", "END PGM {name} MM"),
             tool=("TOOL CALL {tool} Z",),

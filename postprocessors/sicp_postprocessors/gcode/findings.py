@@ -21,6 +21,7 @@ from sicp_postprocessors.gcode.feeds import LEAST_INVERSE
 from sicp_postprocessors.gcode.forward import axes_of
 from sicp_postprocessors.gcode.options import GCodeOptions
 from sicp_postprocessors.gcode.positions import Positions, Setting, tip_deviations_mm
+from sicp_postprocessors.moves import tools_in_use
 from sicp_postprocessors.options import flag
 from sicp_postprocessors.text import counted
 
@@ -189,6 +190,12 @@ def without_tip_findings(
     if positions.angles is None or options.knows_tip:
         return
     written = positions.program.path
+    if setting.machine.kind != "table-table" and len(set(tools_in_use(written).tolist()) - {-1}) > 1:
+        message = (
+            f"the path uses several tools, but X Y Z hold for one length, {flag(post, 'tool_length_mm', 'mm')}: "
+            "write a program for each tool"
+        )
+        yield Finding(626, Level.FAIL, message)
     off = tip_deviations_mm(setting, positions.angles.deg, written.tips_mm)
     cuts = (off > options.tip_tolerance_mm * 1.01) & ~written.rapid
     yield from stretch_findings(

@@ -79,6 +79,8 @@ class GCode(LinePostprocessor):
     def reading(self) -> Mapping[str, object] | str:
         """Return how the reader understands the rotary words, or why it cannot compare the program with the path."""
         options = self.options
+        if not self._control.readable:
+            return "no reader knows conversational programs"
         if options.axis_step_deg is not None:
             return "its moves may have been divided"
         if options.max_moves_per_program is not None:
@@ -271,5 +273,7 @@ class GCode(LinePostprocessor):
         return self._listed_name(program) if self._control.named else super().program_name(program)
 
     def _listed_name(self, program: Program) -> str:
-        plain = re.sub("_+", "_", ascii_name(file_stem(program.name), _LONGEST_NAME, other="_"))
-        return plain.strip("_").upper()
+        name = re.sub("_+", "_", ascii_name(file_stem(program.name), _LONGEST_NAME, other="_")).strip("_")
+        # Siemens wants two letters first.
+        name = name if re.match("[A-Za-z]{2}", name) else f"PR_{name}"
+        return name.upper() if self._control.named == "upper" else name
