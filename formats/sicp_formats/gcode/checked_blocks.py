@@ -6,7 +6,7 @@ import re
 from collections import Counter
 
 from sicp_formats.gcode.checked_arcs import CheckedArcs
-from sicp_formats.gcode.codes import HOMING, MOTION, UNITS, refuse_codes
+from sicp_formats.gcode.codes import HOMING, MOTION, UNITS, heidenhain_text, refuse_codes
 from sicp_formats.gcode.keywords import TIP_CONTROL_OFF, TIP_CONTROL_ON
 from sicp_formats.gcode.machine import END_CODES
 from sicp_formats.gcode.plain import PLAIN
@@ -148,6 +148,8 @@ class CheckedBlocks:
     def _block(self, block: Block, line: int) -> bool:
         if number := block.words.get("N"):
             self._count(number, line)
+        if self._heidenhain and heidenhain_text(block):
+            return False
         self._check_groups(block, line)
         homing = any(code in HOMING for code in block.g) or "SUPA" in block.keywords
         self._take_modes(block, line)
