@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import itertools
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,8 @@ from sicp_postprocessors.rows import rows
 __all__ = ["block_texts", "numbered"]
 
 _FEED_DECIMALS = {"mm": 3, "inch": 5}
+_BETWEEN = ("; ", "M126", "M128", "FUNCTION TCPM")
+"""What may stand between a tool call of Heidenhain and the speed that belongs to it."""
 
 
 def block_texts(moves: Moves, options: GCodeOptions, machine: Machine | None, *, rapid: bool) -> list[str]:
@@ -57,7 +60,7 @@ def block_texts(moves: Moves, options: GCodeOptions, machine: Machine | None, *,
     return rows(control.block.format(code=code, tips=tips, turn=turn, feed=feed, end=end), *columns)
 
 
-def numbered(lines: Iterable[str], control: Dialect, step: int) -> Iterator[str]:
+def numbered(lines: Iterable[str], control: Dialect, step: int) -> list[str]:
     """Return lines with block numbers; numbers begin again where the control has no larger ones.
 
     Raises
@@ -66,23 +69,21 @@ def numbered(lines: Iterable[str], control: Dialect, step: int) -> Iterator[str]
         If a line is longer than the control reads.
 
     >>> from sicp_postprocessors.gcode.dialects import DIALECTS
-    >>> list(numbered(["%", "G90", "(x)", "M30"], DIALECTS["fanuc"], 10))
+    >>> numbered(["%", "G90", "(x)", "M30"], DIALECTS["fanuc"], 10)
     ['%', 'N10 G90', '(x)', 'N20 M30']
     """
-    number = -1 if control.always_numbered else 0
-    for line in _with_speeds(lines) if control.always_numbered else lines:
-        if len(line) > control.longest_line:
-            raise OutputError(
-                f"a block has {len(line)} characters, more than {control.family} reads; write fewer decimals"
-            )
-        if control.always_numbered:
-            number += 1
-        elif not step or line[0] in control.unnumbered:
-            yield line
-            continue
-        else:
-            number = number + step if number + step <= control.largest_number else step
-        yield control.block_number.format(number) + line
+    told = list(lines)
+    longest = max(map(len, told), default=0)
+    if longest > control.longest_line:
+        raise OutputError(f"a block has {longest} characters, too many for {control.family}; write fewer decimals")
+    before = control.block_number
+    if control.always_numbered:
+        return [before.format(number) + line for number, line in enumerate(_with_speeds(told))]
+    if not step:
+        return told
+    within, free = control.largest_number // step, frozenset(control.unnumbered)
+    count = itertools.count()
+    return [line if line[0] in free else before.format((next(count) % within + 1) * step) + line for line in told]
 
 
 def _feed_words(moves: Moves, decimals: int) -> npt.NDArray[np.bytes_]:
@@ -93,21 +94,14 @@ def _feed_words(moves: Moves, decimals: int) -> npt.NDArray[np.bytes_]:
     return column
 
 
-def _with_speeds(lines: Iterable[str]) -> Iterator[str]:
+def _with_speeds(lines: list[str]) -> list[str]:
     """Join the speed of a spindle to the tool call before it, where nothing moves between: `TOOL CALL 3 Z S12000`."""
-    waiting: list[str] = []
-    for line in lines:
-        if line.startswith("TOOL CALL S") and waiting:
-            waiting[0] += line.removeprefix("TOOL CALL")
-            yield from waiting
-            waiting = []
-        elif line.startswith("TOOL CALL ") and not line.startswith("TOOL CALL S"):
-            yield from waiting
-            waiting = [line]
-        elif waiting and line.startswith(("; ", "M126", "M128", "FUNCTION TCPM")):
-            waiting.append(line)
-        else:
-            yield from waiting
-            waiting = []
-            yield line
-    yield from waiting
+    joined = list(lines)
+    for call in [i for i, line in enumerate(lines) if line.startswith("TOOL CALL ") and line[10:11] != "S"]:
+        speed = call + 1
+        while speed < len(lines) and lines[speed].startswith(_BETWEEN):
+            speed += 1
+        if speed < len(lines) and lines[speed].startswith("TOOL CALL S"):
+            joined[call] += lines[speed].removeprefix("TOOL CALL")
+            joined[speed] = ""
+    return [line for line in joined if line]

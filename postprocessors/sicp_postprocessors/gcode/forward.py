@@ -93,11 +93,16 @@ def linear_positions(
 
 def turned(vectors: FloatArray, direction: FloatArray, angles_deg: FloatArray) -> FloatArray:
     """Return vectors (n, 3) turned right-handed about a unit vector (3,) by angles (n,), by Rodrigues' formula."""
-    angles = np.radians(np.remainder(angles_deg, 360.0))
-    cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
-    along = (vectors @ direction)[:, None] * direction
-    crossed = vectors[:, [2, 0, 1]] * direction[[1, 2, 0]] - vectors[:, [1, 2, 0]] * direction[[2, 0, 1]]
-    result: FloatArray = along + (vectors - along) * cosine + crossed * sine
+    angles = np.radians(angles_deg)
+    cosine, sine = np.cos(angles), np.sin(angles)
+    # Column by column, which is several times faster than rows of three.
+    x, y, z = (np.ascontiguousarray(column) for column in vectors.T)
+    i, j, k = direction.tolist()
+    along = (i * x + j * y + k * z) * (1.0 - cosine)
+    result: FloatArray = np.empty((len(angles), 3))
+    result[:, 0] = x * cosine + (j * z - k * y) * sine + along * i
+    result[:, 1] = y * cosine + (k * x - i * z) * sine + along * j
+    result[:, 2] = z * cosine + (i * y - j * x) * sine + along * k
     return result
 
 

@@ -249,7 +249,7 @@ class GCode(LinePostprocessor):
             raise OutputError(f"post {self.name} was asked for feeds of another path; call files or write")
         return feeds_of(self._last[1], self.options)
 
-    def assemble(self, lines: Iterable[str]) -> Iterator[str]:
+    def assemble(self, lines: Iterable[str]) -> list[str]:
         """Return the lines with their block numbers."""
         return numbered(lines, self._control, self.options.line_numbers)
 
