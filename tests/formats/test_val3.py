@@ -305,3 +305,49 @@ def test_conditions_do_not_change_what_they_ask_about(tmp_path: Path) -> None:
     changed = code.replace("logMsg(1)", "p[1]=p[0]")
     with pytest.raises(FormatError, match=r"start\.pgx, line 5: 'p' is changed by the program"):
         read_path(application(tmp_path, changed))
+
+
+@settings(deadline=None, max_examples=60)
+@given(data=st.data())
+def test_stretches_taken_in_one_go_are_those_taken_line_by_line(data: st.DataObject) -> None:
+    """Whatever stands in a program: the same path, events and findings, or the same error."""
+    plain = st.one_of(st.floats(-400, 400).map(repr), st.sampled_from(["90", "-180", "1E2", "270.0", "45"]))
+    number = st.integers(0, 499).flatmap(lambda odd: plain if odd else st.sampled_from(["nan", "1,5", "1e999"]))
+    values = "".join(
+        f'<Value key="{key}" x="{key}" rx="{data.draw(number)}" ry="{data.draw(number)}" rz="{data.draw(number)}"/>'
+        if data.draw(st.integers(0, 99))
+        else f'<Value key="{key}" x="7" fatherId="g[0]"/>'
+        for key in range(12)
+    )
+    variables = (
+        f'<Datas><Data name="p" type="pointRx" size="14">{values}</Data>'
+        '<Data name="m" type="mdesc" size="2"><Value key="0" tmax="10"/><Value key="1" tmax="20"/></Data>'
+        '<Data name="mRapid" type="mdesc"/><Data name="g" type="frame"><Value key="0" z="100" rx="30"/></Data>'
+        '<Data name="n" type="num" size="14"><Value key="3" value="1"/><Value key="5" value="1"/></Data>'
+        '<Data name="i" type="num"/></Datas>'
+    )
+    move = st.tuples(st.integers(0, 12), st.sampled_from(["m[0]", "m[1]", "mRapid", "m"]), st.sampled_from(["t", "u1"]))
+    moving = move.map(lambda m: f"movel(p[{m[0]}],{m[2]},{m[1]})")
+    harmless = st.sampled_from(["// on", "delay(1)", "m.tvel=7", "i=3", "movej(p[2],t,m)", "if i>1\nlogMsg(i)\nendIf"])
+    odd = st.sampled_from(["p[1]=p[0]", "g.trsf.x=1", "movel(p[3],t,mNone)", "movel(p[13],t)"])
+    line = st.integers(0, 99).flatmap(lambda at: moving if at < 85 else harmless if at < 99 else odd)
+    loops = st.sampled_from(["m[0]", "m[n[i]]", "mRapid"]).flatmap(
+        lambda speed: st.tuples(st.integers(0, 4), st.integers(6, 13)).map(
+            lambda ends: f"for i={ends[0]} to {ends[1]}\nmovel(p[i],t,{speed})\nendFor"
+        )
+    )
+    code = "\n".join(data.draw(st.lists(st.one_of(line, line, line, loops), min_size=1, max_size=30)))
+    frame = data.draw(st.sampled_from(["keep", "apply"]))
+    with TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        file = application(Path(folder), code, data=variables)
+        told = []
+        for fewest in (1, 10**9):
+            patch.setattr("sicp_formats.val3.stretch.FEWEST", fewest)
+            try:
+                path = read_path(file, frame=frame)
+            except SicpError as error:
+                told.append(str(error))
+            else:
+                told.append((path.tips_mm.round(9).tolist(), path.axes.round(12).tolist(), path.feeds_mm_min.tolist(),
+                             path.rapid.tolist(), path.lines.tolist(), path.events, path.findings))  # fmt: skip
+        assert told[0] == told[1]

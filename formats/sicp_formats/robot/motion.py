@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from sicp_cam.errors import JobError
-from sicp_cam.model import EventKind, FloatArray
+from sicp_cam.model import BoolArray, EventKind, FloatArray
 from sicp_cam.rigid_motion import from_parts
 from sicp_formats.paths.arcs import Arc, Vector, arc_between, cross, dot, minus, norm, unit
 from sicp_formats.paths.findings import Notice
@@ -177,6 +178,18 @@ class RobotMoves:
         self._check(pose)
         self.moves.move(_tip(pose), self._axis(pose), 0.0 if rapid else feed, rapid, line)
         self.pose = pose
+
+    def straight_many(self, poses: FloatArray, feeds: FloatArray, rapid: BoolArray, lines: Sequence[int]) -> bool:
+        """Append straight moves to poses (n, 4, 4); none, and return False, if one of them is not sure."""
+        limits, (column, sign) = self.moves.limits, self.side
+        too_many = len(self.moves) + len(poses) > limits.path_points
+        if self._waiting or too_many or not (np.abs(poses[:, :3, 3]) <= limits.coordinate_mm).all():
+            return False
+        axes = sign * poses[:, :3, column] + 0.0
+        rows = np.column_stack([poses[:, :3, 3], axes, np.where(rapid, 0.0, feeds), rapid, lines])
+        self.moves.rows.frombytes(np.ascontiguousarray(rows, np.float64).tobytes())
+        self.pose = poses[-1]
+        return True
 
     def arc(self, middle: FloatArray, end: FloatArray, feed: float, line: int) -> None:
         """Append an arc through the tip of one pose to another pose; feed in mm/min."""

@@ -6,7 +6,9 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from sicp_cam.errors import printable
+import numpy as np
+
+from sicp_cam.errors import FormatError, printable
 from sicp_cam.model import EventKind, FloatArray
 from sicp_formats.paths.moves import MoveList
 from sicp_formats.robot.motion import RobotMoves, number_of, pose_xyz
@@ -14,6 +16,7 @@ from sicp_formats.robot.program import Language, RobotError, Runner, Statement, 
 from sicp_formats.val3.data import GEOMETRY
 from sicp_formats.val3.project import Program, Project
 from sicp_formats.val3.scope import Scope
+from sicp_formats.val3.stretch import Stretch, loop_stretch, plain_moves, poses_of
 
 __all__ = ["Val3Runner"]
 
@@ -86,6 +89,16 @@ class Val3Runner(Runner):
             self.run(program.file, program.statements)
             self._file = before
 
+    def run(self, file: Path, statements: Sequence[Statement]) -> None:
+        """Execute statements in order; stretches of plain moves in one go, where nothing is out of the ordinary."""
+        done = 0
+        for first, stop, stretch in plain_moves(statements, _LANGUAGE):
+            super().run(file, statements[done:first])
+            if not self._take(stretch):
+                super().run(file, statements[first:stop])
+            done = stop
+        super().run(file, statements[done:])
+
     def execute(self, text: str, line: int) -> None:
         """Execute one statement."""
         if text.startswith("//"):
@@ -113,7 +126,12 @@ class Val3Runner(Runner):
         first, last, step = (self._scope.whole(text) for text in (loop[2], loop[3], loop[4] or "1"))
         if step == 0:
             raise RobotError("the loop has a step of 0 and would not end; correct it")
-        for value in range(first, last + (1 if step > 0 else -1), step):
+        turns = range(first, last + (1 if step > 0 else -1), step)
+        stretch = loop_stretch(loop[1], turns, statements[1], self._scope) if len(statements) == 3 else None
+        if stretch is not None and self._take(stretch):
+            self._scope.set(loop[1], turns[-1])
+            return
+        for value in turns:
             self._count()
             self._scope.set(loop[1], value)
             self.run(file, statements[1:-1])
@@ -129,6 +147,34 @@ class Val3Runner(Runner):
 
     # --- motion ---
 
+    def _take(self, stretch: Stretch) -> bool:
+        """Take a stretch of straight moves as a whole; False if a line of it needs a look of its own."""
+        if len(stretch.points) > self._left or stretch.names() & (self._scope.changed | self._scope.own_names):
+            return False
+        try:
+            feeds = {speed: self._feed(f"{speed[0]}[{speed[1]}]") for speed in set(stretch.speeds)}
+        except (RobotError, FormatError):
+            return False
+        found = poses_of(stretch, self._variables, self._scope, keep_frame=self._keep_frame)
+        if found is None or (self._keep_frame and self.frames - {found[1]}):
+            return False
+        poses, told, applied = found
+        poses[:, :3, 3] *= self.moves.mm
+        rapid = np.array([name.lower() in self._rapid for name, _ in stretch.speeds], np.bool_)
+        self._robot.with_tool(stretch.tool, stretch.lines[0])
+        if not self._robot.straight_many(poses, np.array([feeds[s] for s in stretch.speeds]), rapid, stretch.lines):
+            return False
+        self._left -= len(stretch.points)
+        if applied or self._keep_frame:
+            self.frames.add(told)
+        self._met()
+        return True
+
+    def _met(self) -> None:
+        """Keep the file that moves are in."""
+        if not self.files or self.files[-1] is not self._file:
+            self.files = [*dict.fromkeys([*self.files, self._file])]
+
     def _move(self, word: str, arguments: list[str], line: int) -> None:
         if len(arguments) != (4 if word == "movec" else 3):
             raise RobotError(f"{word} does not have its {4 if word == 'movec' else 3} arguments; correct the line")
@@ -136,8 +182,7 @@ class Val3Runner(Runner):
         tool, speed = arguments[-2:]
         known = [pose for pose in poses if pose is not None]
         self._robot.with_tool(tool, line)
-        if not self.files or self.files[-1] is not self._file:
-            self.files = [*dict.fromkeys([*self.files, self._file])]
+        self._met()
         if len(known) < len(poses) and word != "movej":
             raise RobotError(f"{word} to joint angles; only movej takes them")
         if not known:
