@@ -20,7 +20,7 @@ from sicp_postprocessors.gcode.divide import axis_turns_deg
 from sicp_postprocessors.gcode.feeds import LEAST_INVERSE
 from sicp_postprocessors.gcode.forward import axes_of
 from sicp_postprocessors.gcode.options import GCodeOptions
-from sicp_postprocessors.gcode.positions import Positions, Setting, tip_deviations_mm
+from sicp_postprocessors.gcode.positions import Positions, Setting
 from sicp_postprocessors.moves import tools_in_use
 from sicp_postprocessors.options import flag
 from sicp_postprocessors.text import counted
@@ -196,7 +196,7 @@ def without_tip_findings(
             "write a program for each tool"
         )
         yield Finding(626, Level.FAIL, message)
-    off = tip_deviations_mm(setting, positions.angles.deg, written.tips_mm)
+    off = positions.off_way_mm
     cuts = (off > options.tip_tolerance_mm * 1.01) & ~written.rapid
     yield from stretch_findings(
         program.path,

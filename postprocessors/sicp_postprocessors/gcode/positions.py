@@ -65,6 +65,8 @@ class Positions:
         (m, 2) rounded angles of the first and second axis, through full turns; None for vectors.
     tip_errors_mm, axis_errors_deg
         (m,) how far tip and tool axis of the written numbers are from the path.
+    off_way_mm
+        (m,) how far the tip leaves its straight way on the move; 0 where the control holds it.
     """
 
     program: Program
@@ -76,6 +78,7 @@ class Positions:
     deg: FloatArray | None
     tip_errors_mm: FloatArray
     axis_errors_deg: FloatArray
+    off_way_mm: FloatArray
 
     def told(self, moves: BoolArray) -> BoolArray:
         """Return which moves of the program as given (n,) have a written move marked in `moves` (m,)."""
@@ -88,8 +91,9 @@ def positions_of(program: Program, options: GCodeOptions, setting: Setting | Non
     """Return what is written for a program; `setting` is that of rotary words, None for vectors."""
     pieces = np.ones(len(program.path), np.int64)
     whole, origin, angles = program, np.arange(len(pieces)), _angles(program, options, setting)
+    off = _off_way_mm(whole, options, setting, angles)
     for _ in range(_PASSES if options.axis_step_deg is not None else 0):
-        needed = _needed(whole, options, setting, angles)
+        needed = _needed(whole, options, angles, off)
         more = np.maximum.reduceat(needed, np.append(0, last_pieces(pieces)[:-1] + 1)) if len(pieces) else needed
         if (more <= 1).all():
             break
@@ -98,7 +102,8 @@ def positions_of(program: Program, options: GCodeOptions, setting: Setting | Non
             break
         whole, origin = divided(program, pieces)
         angles = _angles(whole, options, setting)
-    return _written(whole, pieces, origin, options, setting, angles)
+        off = _off_way_mm(whole, options, setting, angles)
+    return _written(whole, pieces, origin, options, setting, angles, off)
 
 
 def _angles(program: Program, options: GCodeOptions, setting: Setting | None) -> Angles | None:
@@ -107,27 +112,31 @@ def _angles(program: Program, options: GCodeOptions, setting: Setting | None) ->
     return angles_along(setting.machine, program.path.axes, program.path.rapid, options.singular_cone_deg)
 
 
-def _needed(program: Program, options: GCodeOptions, setting: Setting | None, angles: Angles | None) -> IntArray:
+def _off_way_mm(program: Program, options: GCodeOptions, setting: Setting | None, angles: Angles | None) -> FloatArray:
+    if setting is None or angles is None or options.knows_tip:
+        return np.zeros(len(program.path))
+    return _tip_deviations_mm(setting, angles.deg, program.path.tips_mm)
+
+
+def _needed(program: Program, options: GCodeOptions, angles: Angles | None, off: FloatArray) -> IntArray:
     """Return into how many pieces each move should be divided (n,)."""
     path, step = program.path, options.axis_step_deg or 360.0
     turned = axis_turns_deg(path.axes)
     needed = np.ones(len(path), np.int64)
-    if setting is None or angles is None:
+    if angles is None:
         needed = np.ceil(turned / step - _SLACK).astype(np.int64)
     else:
         steps = np.abs(np.diff(angles.deg, axis=0)).max(axis=1, initial=0.0)
         needed[1:] = np.ceil(steps / step - _SLACK)
         needed = np.minimum(needed, np.ceil(turned / _LEAST_AXIS_DEG))
-        if not options.knows_tip:
-            off = tip_deviations_mm(setting, angles.deg, path.tips_mm)
-            needed = np.maximum(needed, np.ceil(np.sqrt(off / options.tip_tolerance_mm) - _SLACK))
+        needed = np.maximum(needed, np.ceil(np.sqrt(off / options.tip_tolerance_mm) - _SLACK))
     needed = np.clip(needed, 1, _MOST_PIECES).astype(np.int64)
     needed[path.rapid] = 1
     needed[:1] = 1
     return needed
 
 
-def tip_deviations_mm(setting: Setting, deg: FloatArray, tips_mm: FloatArray) -> FloatArray:
+def _tip_deviations_mm(setting: Setting, deg: FloatArray, tips_mm: FloatArray) -> FloatArray:
     """Return how far the tip is from its straight way (m,), half way, if all axes move evenly and no control helps."""
     linear = setting.linear(deg, tips_mm)
     half_way = setting.tips((deg[1:] + deg[:-1]) / 2.0, (linear[1:] + linear[:-1]) / 2.0)
@@ -142,13 +151,14 @@ def _written(
     options: GCodeOptions,
     setting: Setting | None,
     angles: Angles | None,
+    off_way_mm: FloatArray,
 ) -> Positions:
     path, factor = program.path, mm_per_unit(options.units)
     if setting is None or angles is None:
         xyz, turn = rounded(path.tips_mm / factor, options.position_decimals), rounded(path.axes, options.axis_decimals)
         off = np.linalg.norm(xyz * factor - path.tips_mm, axis=1)
         errors = axis_errors_deg(path.axes, turn / np.linalg.norm(turn, axis=1, keepdims=True))
-        return Positions(program, pieces, origin, xyz, turn, None, None, off, errors)
+        return Positions(program, pieces, origin, xyz, turn, None, None, off, errors, off_way_mm)
     deg = rounded(angles.deg, options.angle_decimals)
     words = _wrapped(setting.machine, deg, options.angle_decimals)
     # The linear axes answer to the angles as they are written, so that their rounding does not move the tip.
@@ -166,6 +176,7 @@ def _written(
         deg,
         np.linalg.norm(tips - path.tips_mm, axis=1),
         axis_errors_deg(path.axes, axes_of(setting.machine, words)),
+        off_way_mm,
     )
 
 
