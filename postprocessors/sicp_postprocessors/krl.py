@@ -14,11 +14,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from sicp_cam.model import FloatArray, Program
+from sicp_cam.model import EventKind, FloatArray, Program, ToolPath
 from sicp_cam.ranges import Between
 from sicp_cam.rigid_motion import from_parts
 from sicp_postprocessors.controllers import ControllerOptions, ControllerPostprocessor, labelled, tool_numbers
-from sicp_postprocessors.moves import Moves
+from sicp_postprocessors.moves import Moves, events_in_order
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.orientations import Six, euler_zyx, rotation_matrices
 from sicp_postprocessors.rows import rows, words
@@ -232,7 +232,7 @@ class Krl(ControllerPostprocessor):
         if options.base_number is None:
             lines += [f"DECL FRAME PART_BASE={_frame(self.pose_in_world(program))}"]
         if options.tool_number is None:
-            tools = map(_tool_name, tool_numbers(program.path))
+            tools = dict.fromkeys(map(_tool_name, _tools_told(program.path)))
             lines += [f"DECL FRAME {tool}={_frame(self.tool_in_flange())}" for tool in tools]
         if options.payload is not None:
             mass, *centre = options.payload
@@ -247,6 +247,12 @@ def _columns(moves: Moves) -> list[FloatArray]:
 
 def _state(status: int | None, turn: int | None) -> str:
     return "" if status is None else f",S {status},T {turn}"
+
+
+def _tools_told(path: ToolPath) -> list[int]:
+    """Return the tools that the program chooses, also where no move follows."""
+    told = [int(event.value) for event in events_in_order(path) if event.kind is EventKind.TOOL]
+    return [*tool_numbers(path), *told]
 
 
 def _tool_name(number: int) -> str:

@@ -229,6 +229,11 @@ def test_tools_have_frames_of_their_own_where_the_language_names_them():
     assert rapid["porthole.mod"].count(b",tTool1\\WObj") == rapid["porthole.mod"].count(b",tTool2\\WObj") == 3
 
 
+@EACH
+def test_a_tool_after_the_last_move_is_declared_too(post):
+    run(post(GIVEN), straight_program(3, events=(Event(3, EventKind.TOOL, 7.0, "T7"),)))
+
+
 # --- frames, tools, zones, speeds ---
 
 
