@@ -1,5 +1,6 @@
 """The reader of Fanuc listings against programs whose truth is known."""
 
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -203,3 +204,12 @@ def test_a_number_that_is_too_large_is_refused(tmp_path: Path) -> None:
     points = "\n".join([point(1, 0), point(2, 9).replace("W = 180.000000", f"W = {'9' * 400}")])
     with pytest.raises(FormatError, match=r"a\.ls, line \d+: W of P\[2\] is too large to be a number"):
         read(tmp_path, "L P[1] 9mm/sec FINE\nL P[2] 9mm/sec FINE", points)
+
+
+@pytest.mark.parametrize("line", [" " * 50_000 + "x", "   1:R[" + "]" * 50_000 + " ;", "P[1" + " " * 50_000])
+def test_a_long_line_takes_no_long_time(tmp_path: Path, line: str) -> None:
+    (tmp_path / "a.ls").write_text(f"/PROG A\n/MN\n{line}\n/POS\n{line}\n/END\n")
+    begun = time.process_time()
+    with pytest.raises(FormatError, match=r"a\.ls, line [35]"):
+        read_path(tmp_path / "a.ls")
+    assert time.process_time() - begun < 1.0

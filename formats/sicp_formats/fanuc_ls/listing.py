@@ -19,8 +19,8 @@ __all__ = ["Listing", "Position", "read_listing"]
 
 _SECTION = re.compile(r"/(PROG|ATTR|APPL|MN|POS|END)\b[ \t]*(.*)", re.ASCII)
 _NAME = re.compile(r"[A-Za-z_][\w-]*", re.ASCII)
-_NUMBERED = re.compile(r"[ \t]*[0-9]*[ \t]*:(.*)", re.ASCII)
-_HEAD = re.compile(r'[ \t]*P\[[ \t]*([0-9]{1,9})[ \t]*(?::[ \t]*"?[^"\]]*"?[ \t]*)?\][ \t]*\{(.*)', re.ASCII)
+_NUMBERED = re.compile(r"[ \t]*(?:[0-9]+[ \t]*)?:(.*)", re.ASCII)
+_HEAD = re.compile(r"[ \t]*P\[[ \t]*([0-9]{1,9})[ \t]*(?::[^\]]*)?\][ \t]*\{(.*)", re.ASCII)
 _GROUP = re.compile(r"GP[ \t]*([0-9])[ \t]*:", re.ASCII)
 _FRAME = re.compile(r"\b(UF|UT)[ \t]*:[ \t]*([0-9]{1,3}|F)\b", re.ASCII)
 _VALUE = re.compile(rf"\b([XYZWPR]|[JE][1-9])[ \t]*=[ \t]*({NUMBER}|\*+)[ \t]*(mm|deg|)", re.ASCII)

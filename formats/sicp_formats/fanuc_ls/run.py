@@ -37,7 +37,7 @@ _CONDITION = re.compile(r"(?:IF\b.*,|WHEN\b.*,)[ \t]*(.*)", re.ASCII)
 _LEAVES = re.compile(r"(?:JMP|SELECT|=|ELSE[ \t]*,|END\b|ABORT\b)", re.ASCII)
 _MOVING_SENSOR = re.compile(r"(?:Track|TRACK|Soft[ \t]*Float|SOFTFLOAT|LINE\[|DEFENC|SETTRIG|RCV|PRG_SHIFT)", re.ASCII)
 _HARMLESS = re.compile(
-    r"(?:(?:[DRSAGUW][OI]|PR|SR|R|F|M|AR|TIMER|UFRAME|UTOOL|PL)\[.*\][^=]*=|\$[\w.\[\]]+[ \t]*=|LBL\[|WAIT\b"
+    r"(?:(?:[DRSAGUW][OI]|PR|SR|R|F|M|AR|TIMER|UFRAME|UTOOL|PL)\[[^\]]*\][^=]*=|\$[\w.\[\]]+[ \t]*=|LBL\[|WAIT\b"
     r"|OVERRIDE\b|PAYLOAD\b|(?:JOINT|LINEAR)_MAX_SPEED|MESSAGE\[|UALM\[|PROMPT\w*\[|RSR\[|MONITOR\b|RUN\b|(?:UN)?LOCK\b"
     r"|(?:TOOL_)?OFFSET CONDITION|SKIP CONDITION|COL (?:DETECT|GUARD)|DIAG_|(?:Arc|Weld) (?:Start|End)|Weave\b"
     r"|STOP_TRACKING|RESUME_PROG|ERROR_PROG|MAINT_PROG|CLEAR_RESUME_PROG|STRLEN|ELSE$|ENDIF|VISION\b|TC_ONLINE)",
