@@ -23,6 +23,7 @@ from sicp_postprocessors.gcode.options import GCodeOptions
 from sicp_postprocessors.gcode.positions import Positions, Setting
 from sicp_postprocessors.moves import tools_in_use
 from sicp_postprocessors.options import flag
+from sicp_postprocessors.orientations import axis_errors_deg
 from sicp_postprocessors.text import counted
 
 __all__ = [
@@ -134,23 +135,27 @@ def _turn_findings(
 
 
 def _way_errors_deg(setting: Setting, deg: FloatArray, axes: FloatArray, moves: IntArray) -> FloatArray:
-    """Return how far the tool axis is from the great circle, at most of three places on the way of some moves."""
+    """Return how far the tool axis leaves the shortest way on some moves, the most of three places on it.
+
+    Between the two axes the distance from their great circle counts, beyond them that from the nearer one.
+    """
     start, end = axes[moves - 1], axes[moves]
-    normal, middle = np.cross(start, end), start + end
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-12)
+    normal, middle = _units(np.cross(start, end)), _units(start + end)
+    has_circle = np.einsum("ni,ni->n", normal, normal) > 0.5
     worst = np.zeros(len(moves))
     for share in (0.25, 0.5, 0.75):
         on_way = axes_of(setting.machine, deg[moves - 1] + share * (deg[moves] - deg[moves - 1]))
-        across = np.abs(np.einsum("ni,ni->n", on_way, normal))
+        across = np.arcsin(np.minimum(np.abs(np.einsum("ni,ni->n", on_way, normal)), 1.0))
         between = np.einsum("ni,ni->n", on_way, middle) >= np.einsum("ni,ni->n", start, middle)
-        ends = np.minimum(np.linalg.norm(on_way - start, axis=1), np.linalg.norm(on_way - end, axis=1))
-        # Between the two axes the distance from their great circle counts, beyond them that from the nearer one.
-        off = np.where(
-            between & (np.linalg.norm(normal, axis=1) > 0.5), across, 2.0 * np.arcsin(np.minimum(ends / 2, 1.0))
-        )
-        worst = np.maximum(worst, np.degrees(np.where(off == across, np.arcsin(np.minimum(across, 1.0)), off)))
+        nearer = np.minimum(axis_errors_deg(on_way, start), axis_errors_deg(on_way, end))
+        worst = np.maximum(worst, np.where(between & has_circle, np.degrees(across), nearer))
     return worst
+
+
+def _units(vectors: FloatArray) -> FloatArray:
+    """Return vectors of length 1, but for those without a direction."""
+    units: FloatArray = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return units
 
 
 def division_findings(post: str, program: Program, options: GCodeOptions, positions: Positions) -> Iterator[Finding]:
