@@ -129,11 +129,13 @@ def _check_father(application: Application, variables: Variables, variable: Vari
     root, wanted = ("flange", "tool") if variable.type == "tool" else ("world", "frame")
     if variable.type not in ("point", "frame", "tool"):
         return
+    problems: dict[str, str] = {"": ""}
     for key, (line, attributes) in variable.values.items():
         text = attributes.get("fatherId", "").strip()
-        message = _father_problem(application, variables, variable, key, root, wanted) if text else ""
-        if message:
-            what = f"{_named(variable, key)} stands in {printable(text, 40)}, {message}"
+        if text not in problems:
+            problems[text] = _father_problem(application, variables, variable, key, root, wanted)
+        if problems[text]:
+            what = f"{_named(variable, key)} stands in {printable(text, 40)}, {problems[text]}"
             report.add(859, Level.FAIL, what, variable.file, line, kind=f"father {text}")
         if variable.name == root and any(number_of(attributes.get(each, "0")) for each in ("x", "y", "z", *_ANGLES)):
             what = f"the built-in {root} is given a pose, which it does not take; declare a {wanted} of your own"
