@@ -17,22 +17,21 @@ import numpy.typing as npt
 
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import BoolArray, FloatArray, Program, ToolPath
-from sicp_cam.rigid_motion import from_parts
 from sicp_postprocessors.base import failures
 from sicp_postprocessors.checks import stretch_findings
 from sicp_postprocessors.controllers import ControllerPostprocessor
 from sicp_postprocessors.fanuc_ls_options import FanucLsOptions
+from sicp_postprocessors.fanuc_ls_text import frame_values, listing_head, wpr_deg
 from sicp_postprocessors.moves import Moves
-from sicp_postprocessors.numbers import fixed, trimmed
+from sicp_postprocessors.numbers import fixed
 from sicp_postprocessors.options import flag
-from sicp_postprocessors.orientations import Six, euler_zyx, rotation_matrices
+from sicp_postprocessors.orientations import Six, pose_from_zyx
 from sicp_postprocessors.rows import rows, words
 from sicp_postprocessors.text import ascii_line, ascii_lines
 
 __all__ = ["FanucLs", "FanucLsOptions"]
 
 _LONGEST_REMARK = 32
-_LONGEST_COMMENT = 16
 _LONGEST_MESSAGE = 24
 _LONGEST_WAIT_S = 300.0
 _FRAMES = ("UFRAME", "UTOOL")
@@ -114,7 +113,7 @@ class FanucLs(ControllerPostprocessor):
         """Return the number of each move's position in its program, and W, P, R in degrees."""
         numbers = np.concatenate([np.arange(len(part)) for part in self.parts(program.path)])
         first = 1 if self.options.frame_register is None else len(_FRAMES) + 1
-        return np.column_stack([numbers + first, _wpr(self.rotations(program.path))])
+        return np.column_stack([numbers + first, wpr_deg(self.rotations(program.path))])
 
     def move_joint(self, moves: Moves) -> list[str]:
         """Return the move to the first point, axis by axis."""
@@ -150,8 +149,7 @@ class FanucLs(ControllerPostprocessor):
     def own_pose(self, six: Six) -> FloatArray:
         """Return the pose of x, y, z, W, P, R."""
         x, y, z, w, p, r = six
-        turns = rotation_matrices(np.array([[0.0, 0.0, r], [0.0, p, 0.0], [w, 0.0, 0.0]]))
-        return from_parts(turns[0] @ turns[1] @ turns[2], (x, y, z))
+        return pose_from_zyx((x, y, z, r, p, w))
 
     def frame_words(self) -> str:
         """Return the user frame."""
@@ -172,7 +170,7 @@ class FanucLs(ControllerPostprocessor):
             (options.tool, f"UTOOL[{options.utool}]", self.tool_in_flange()),
         ):
             if told is not None:
-                yield f"{name} {_frame_values(pose)}"
+                yield f"{name} {frame_values(pose)}"
 
     def program_files(self, program: Program, name: str) -> dict[str, bytes]:
         """Return NAME.ls, and the programs that it calls."""
@@ -190,14 +188,16 @@ class FanucLs(ControllerPostprocessor):
 
     def _listing(self, name: str, lines: Sequence[str], positions: bytes) -> bytes:
         numbered = [f"{number:4}:{line}" for number, line in enumerate(lines, 1)]
-        return self.encoded([*_head(name, len(numbered)), *numbered, "/POS"]) + positions + self.encoded(["/END"])
+        return (
+            self.encoded([*listing_head(name, len(numbered)), *numbered, "/POS"]) + positions + self.encoded(["/END"])
+        )
 
     def _frame_positions(self, program: Program) -> bytes:
         """Return the positions P[1] and P[2] that hold the frames which the program sets."""
         if self.options.frame_register is None:
             return b""
         poses = np.stack([self.pose_in_world(program), self.tool_in_flange()])
-        targets = np.column_stack([np.arange(1, len(_FRAMES) + 1), _wpr(poses[:, :3, :3])])
+        targets = np.column_stack([np.arange(1, len(_FRAMES) + 1), wpr_deg(poses[:, :3, :3])])
         return self._position_texts(poses[:, :3, 3], targets, 0)
 
     def _position_texts(self, tips_mm: FloatArray, targets: FloatArray, uframe: int) -> bytes:
@@ -241,8 +241,11 @@ class FanucLs(ControllerPostprocessor):
         values, in_mm_s = self._speeds(feeds)
         written = values * np.where(in_mm_s, 60.0, 10.0)
         off = (np.abs(written - feeds) > _ROUNDED * feeds) & (np.arange(len(path)) > 0)
+        slow, fast = off & (written < feeds), off & (written > feeds)
         message = "the speed is a whole number and differs by over 1 percent; change the feed, or speed_unit"
-        findings = stretch_findings(path, off, 674, Level.WARN, message)
+        findings = stretch_findings(path, slow, 674, Level.WARN, message)
+        message = "the speed is below 1 cm/min or 1 mm/sec, the least that the controller takes; raise the feed"
+        findings += stretch_findings(path, fast, 674, Level.FAIL, message)
         if options.rounding == "CNT" and (self.zones_mm(path) > 0.0).any():
             message = (
                 f"corners are rounded by CNT{options.cnt}, which depends on the speed: blend_mm and blend_corner_mm do "
@@ -250,39 +253,3 @@ class FanucLs(ControllerPostprocessor):
             )
             findings.append(Finding(672, Level.WARN, message))
         return findings
-
-
-def _wpr(R: FloatArray) -> FloatArray:
-    """Return W, P, R (n, 3) in degrees of rotations (n, 3, 3)."""
-    return euler_zyx(R)[:, ::-1]
-
-
-def _frame_values(pose: FloatArray) -> str:
-    values = zip("XYZWPR", (*pose[:3, 3].tolist(), *_wpr(pose[None, :3, :3])[0].tolist()), strict=True)
-    return " ".join(f"{name}={trimmed(value, 4)}" for name, value in values)
-
-
-def _head(name: str, lines: int) -> list[str]:
-    """Return what stands before the numbered statements of a listing."""
-    return [
-        f"/PROG  {name}",
-        "/ATTR",
-        "OWNER       = MNEDITOR;",
-        f'COMMENT     = "{ascii_line(name)[:_LONGEST_COMMENT]}";',
-        "PROG_SIZE   = 0;",
-        "FILE_NAME   = ;",
-        "VERSION     = 0;",
-        f"LINE_COUNT  = {lines};",
-        "MEMORY_SIZE = 0;",
-        "PROTECT     = READ_WRITE;",
-        "TCD:  STACK_SIZE    = 0,",
-        "      TASK_PRIORITY = 50,",
-        "      TIME_SLICE    = 0,",
-        "      BUSY_LAMP_OFF = 0,",
-        "      ABORT_REQUEST = 0,",
-        "      PAUSE_REQUEST = 0;",
-        "DEFAULT_GROUP   = 1,*,*,*,*;",
-        "CONTROL_CODE    = 00000000 00000000;",
-        "/APPL",
-        "/MN",
-    ]

@@ -16,11 +16,10 @@ import numpy as np
 
 from sicp_cam.model import EventKind, FloatArray, Program, ToolPath
 from sicp_cam.ranges import Between
-from sicp_cam.rigid_motion import from_parts
 from sicp_postprocessors.controllers import ControllerOptions, ControllerPostprocessor, labelled, tool_numbers
 from sicp_postprocessors.moves import Moves, events_in_order
 from sicp_postprocessors.numbers import trimmed
-from sicp_postprocessors.orientations import Six, euler_zyx, rotation_matrices
+from sicp_postprocessors.orientations import Six, euler_zyx, pose_from_zyx
 from sicp_postprocessors.rows import rows, words
 
 __all__ = ["Krl", "KrlOptions"]
@@ -199,9 +198,7 @@ class Krl(ControllerPostprocessor):
 
     def own_pose(self, six: Six) -> FloatArray:
         """Return the pose of x, y, z, A, B, C."""
-        x, y, z, a, b, c = six
-        turns = rotation_matrices(np.array([[0.0, 0.0, a], [0.0, b, 0.0], [c, 0.0, 0.0]]))
-        return from_parts(turns[0] @ turns[1] @ turns[2], (x, y, z))
+        return pose_from_zyx(six)
 
     def frame_words(self) -> str:
         """Return the base in the words of the controller."""

@@ -24,6 +24,7 @@ __all__ = [
     "euler_zyx",
     "flange_turns_deg",
     "pose_from_six",
+    "pose_from_zyx",
     "quaternions",
     "rotation_matrices",
     "rotation_vectors",
@@ -137,6 +138,17 @@ def rotation_vectors(R: FloatArray) -> FloatArray:
 def pose_from_six(six: tuple[float, ...]) -> FloatArray:
     """Return the (4, 4) pose of x, y, z in mm and rx, ry, rz in degrees."""
     return from_parts(rotation_matrices(np.array([six[3:]]))[0], six[:3])
+
+
+def pose_from_zyx(six: tuple[float, ...]) -> FloatArray:
+    """Return the (4, 4) pose of x, y, z in mm and a, b, c in degrees with R = Rz(a) Ry(b) Rx(c).
+
+    >>> (pose_from_zyx((1.0, 2.0, 3.0, 90.0, 0.0, 90.0))[:3, 2].round(6) + 0.0).tolist()
+    [1.0, 0.0, 0.0]
+    """
+    a, b, c = six[3:]
+    turns = rotation_matrices(np.array([[0.0, 0.0, a], [0.0, b, 0.0], [c, 0.0, 0.0]]))
+    return from_parts(turns[0] @ turns[1] @ turns[2], six[:3])
 
 
 def six_from_pose(pose: FloatArray) -> tuple[float, ...]:

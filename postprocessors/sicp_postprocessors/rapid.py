@@ -16,11 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sicp_cam.model import BoolArray, FloatArray, IntArray, Program, ToolPath
-from sicp_cam.rigid_motion import from_parts
 from sicp_postprocessors.controllers import ControllerPostprocessor, tool_numbers
 from sicp_postprocessors.moves import Moves
 from sicp_postprocessors.numbers import trimmed
-from sicp_postprocessors.orientations import Six, quaternions, rotation_matrices
+from sicp_postprocessors.orientations import Six, pose_from_zyx, quaternions
 from sicp_postprocessors.rapid_options import RapidOptions
 from sicp_postprocessors.robot import ZERO
 from sicp_postprocessors.rows import rows, words
@@ -143,9 +142,7 @@ class Rapid(ControllerPostprocessor):
 
     def own_pose(self, six: Six) -> FloatArray:
         """Return the pose of x, y, z, EZ, EY, EX: R = Rz Ry Rx."""
-        x, y, z, ez, ey, ex = six
-        turns = rotation_matrices(np.array([[0.0, 0.0, ez], [0.0, ey, 0.0], [ex, 0.0, 0.0]]))
-        return from_parts(turns[0] @ turns[1] @ turns[2], (x, y, z))
+        return pose_from_zyx(six)
 
     def payload_is_known(self) -> bool:
         """Say whether the load is stated, or comes with the controller's tool."""

@@ -33,6 +33,7 @@ READ = {
     "robodk": read_robodk,
 }
 CONTROLLERS = [Krl, Rapid, FanucLs, UrScript]
+LIMITED = pytest.mark.parametrize("post", [Krl, Rapid, FanucLs], ids=lambda post: post.name)
 EACH = pytest.mark.parametrize("post", CONTROLLERS, ids=lambda post: post.name)
 ALL = pytest.mark.parametrize("post", [*CONTROLLERS, RoboDkCsv], ids=lambda post: post.name)
 OUTPUTS = {"krl": ("3", "4"), "rapid": ("doSpindle", "doCool"), "ls": ("3", "RO4"), "ur": ("3", "tool_1")}
@@ -330,10 +331,8 @@ def test_zones_stay_within_half_of_the_shorter_way(post):
     assert max(run(post({"first_run": True}), program).feeds) <= 3000.0
 
 
-@EACH
+@LIMITED
 def test_a_speed_that_the_language_does_not_take_is_refused(post):
-    if post().largest_mm_s == np.inf:
-        pytest.skip("no limit is known")
     with pytest.raises(PathError, match=r"move 1, line 11: the speed is beyond the [0-9]+ mm/s"):
         post().write(straight_program(4, feed=[0, 480_000, 600, 600]))
     with pytest.raises(PathError, match="rapid_mm_s="):
@@ -341,12 +340,14 @@ def test_a_speed_that_the_language_does_not_take_is_refused(post):
 
 
 def test_listings_round_speeds_to_whole_numbers_that_are_never_faster():
-    program = straight_program(7, feed=[0, 600, 2000, 1234, 37, 5, 120_000])
+    program = straight_program(7, feed=[0, 600, 2000, 1234, 37, 15, 120_000])
     made = FanucLs()
     assert run(made, program).feeds[1:] == [600, 2000, 1230, 30, 10, 120_000]
     told = [(f.code, f.where) for f in made.preflight(program) if f.code == 674]
     assert told == [(674, "moves 4 to 5, lines 14 to 15")]
-    assert run(FanucLs({"speed_unit": "mm/sec"}), program).feeds[1:4] == [600, 1980, 1200]
+    with pytest.raises(PathError, match="moves 4 to 5, lines 14 to 15: the speed is below 1 cm/min or 1 mm/sec"):
+        FanucLs({"speed_unit": "mm/sec"}).write(program)
+    assert run(FanucLs({"speed_unit": "mm/sec"}), straight_program(3, feed=[0, 2000, 1234])).feeds[1:] == [1980, 1200]
 
 
 def test_listings_wait_long_in_pieces():
