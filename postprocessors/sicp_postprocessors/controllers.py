@@ -62,9 +62,9 @@ class ControllerOptions(RobotOptions):
     decimals: Annotated[int, Between(3, 6)] = 4
     """Decimals of positions in mm."""
 
+    # What a digital output is called by, as a pattern and in words; and an analog one.
     signal: ClassVar[re.Pattern[str]]
     signal_words: ClassVar[str]
-    """What a digital output is called by, as a pattern and in words; and an analog one."""
     analog: ClassVar[re.Pattern[str]]
     analog_words: ClassVar[str]
 

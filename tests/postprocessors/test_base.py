@@ -19,13 +19,18 @@ from sicp_cam.model import Event, EventKind
 from sicp_cam.ranges import Between
 from sicp_postprocessors.base import Postprocessor
 from sicp_postprocessors.checks import common_findings, event_findings, move_place, stretch_findings
+from sicp_postprocessors.fanuc_ls import FanucLs
 from sicp_postprocessors.gcode import GCode
+from sicp_postprocessors.krl import Krl
 from sicp_postprocessors.numbers import fixed, rounded, trimmed
 from sicp_postprocessors.options import THIS_POST, build_options, flag, outside
 from sicp_postprocessors.path_csv import PathCsv
+from sicp_postprocessors.rapid import Rapid
+from sicp_postprocessors.robodk_csv import RoboDkCsv
 from sicp_postprocessors.rows import rows, words
 from sicp_postprocessors.template import LinePostprocessor
 from sicp_postprocessors.text import ascii_line, ascii_lines, ascii_name, counted, file_stem
+from sicp_postprocessors.urscript import UrScript
 from sicp_postprocessors.val3 import Val3
 
 
@@ -419,7 +424,7 @@ class TestTemplate:
             Escaping().write(straight_program(2))
 
 
-@pytest.mark.parametrize("post", [Val3, GCode, PathCsv])
+@pytest.mark.parametrize("post", [Val3, GCode, PathCsv, Krl, Rapid, FanucLs, UrScript, RoboDkCsv])
 def test_every_option_has_a_docstring_under_its_field(post):
     """`sicp-cam plugins NAME` reads them from the source: a text of its own for each, that ends as a sentence."""
     own = [kind for kind in reversed(post.Options.__mro__) if dataclasses.is_dataclass(kind)]

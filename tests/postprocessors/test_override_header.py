@@ -12,15 +12,18 @@ from sicp_cam.model import EventKind
 from sicp_postprocessors.apt import Apt
 from sicp_postprocessors.base import SAFETY_NOTE
 from sicp_postprocessors.gcode import GCode
+from sicp_postprocessors.krl import Krl
 from sicp_postprocessors.path_csv import COLUMNS, PathCsv
+from sicp_postprocessors.rapid import Rapid
 from sicp_postprocessors.template import LinePostprocessor
 from sicp_postprocessors.text import ascii_line
+from sicp_postprocessors.urscript import UrScript
 from sicp_postprocessors.val3 import Val3
 
 JUMP = "gate jump_mm overridden by the operator: 0.75, limit 0.5"
 HALVES = "gate leave_out_mm overridden by the operator: could not be measured, limit 0.6"
 BROKEN = (JUMP, HALVES)
-COMMENT = ("(", ";", "//", "$$", "'")
+COMMENT = ("(", ";", "//", "$$", "'", "! ", "# ")
 
 
 class Bare(LinePostprocessor):
@@ -41,6 +44,7 @@ class Bare(LinePostprocessor):
 
 
 LINES = {"gcode": GCode(), "siemens": GCode({"orientation": "siemens"}), "val3": Val3(), "apt": Apt(), "bare": Bare()}
+LINES |= {"krl": Krl(), "rapid": Rapid(), "ur": UrScript()}
 EACH = pytest.mark.parametrize("post", LINES.values(), ids=list(LINES))
 
 
@@ -54,7 +58,7 @@ def head_of(text):
     lines = [line.strip() for line in text.splitlines()]
     first = next(i for i, line in enumerate(lines) if SAFETY_NOTE in line)
     start = next(i for i in range(first, -1, -1) if i == 0 or not lines[i - 1].startswith(COMMENT))
-    return [line.lstrip("(;/$' ").rstrip(")") for line in lines[start : first + 1]]
+    return [line.lstrip("(;/$'!# ").rstrip(")") for line in lines[start : first + 1]]
 
 
 @EACH

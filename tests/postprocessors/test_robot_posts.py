@@ -538,3 +538,9 @@ def test_a_table_for_robodk_says_in_its_first_row_what_it_is():
     assert rows[0].endswith(",porthole / corrected by sicp_cam / gates: all passed / gate x / not a safety function: "
                             "verify at reduced speed")  # fmt: skip
     assert rows[1].endswith(",1,33.33333,0,") and rows[0].count(",") == rows[1].count(",") == 9
+
+
+def test_a_listing_names_in_its_head_the_gates_that_were_overridden():
+    again = run(FanucLs(), simple_program(overridden=("gate jump_mm; 0.75, limit 0.5", "gate halves")))
+    head = " ".join(value for kind, value in again.actions[:20] if kind == "comment")
+    assert head.index("gate jump_mm, 0.75, limit 0.5") < head.index("gate halves") < head.index("not a safety function")
