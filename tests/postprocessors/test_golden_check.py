@@ -17,12 +17,23 @@ READING = {
     **{case: RoboDkCsv().reading() for case in ("robodk", "robodk-nasty")},
     "gcode-rotary-ac": {"rotary": "AC"},
     "gcode-rotary-bc-inch": {"rotary": "BC"},
+    "gcode-haas": {"rotary": "AC"},
+    "gcode-heidenhain": {"rotary": "BC"},
+    "gcode-heidenhain-nasty": {"rotary": "AC"},
+    "gcode-linuxcnc": {"rotary": "AC"},
+    "gcode-linuxcnc-inverse": {"rotary": "AC"},
+    "gcode-linuxcnc-nasty": {"rotary": "AC"},
+    "gcode-plain": {"rotary": "AC"},
+    "gcode-siemens-rotary": {"rotary": "AB"},
     "dxf": {"layers": "CUT"},
 }
 """What the reader of a case must be told."""
 EXPLAINED = {
     "dxf": {302, 303, 366},  # a drawing has neither feeds nor tool axes, nor ways between its curves
     "dxf-nasty": {302, 303, 366},
+    "gcode-linuxcnc-inverse": {313},  # the word for tool tip control is the machine's own, and an option
+    "gcode-linuxcnc-nasty": {313},
+    "gcode-plain": {313},  # it has none: X Y Z are those of the machine
     "rapid-procedures": {886},  # tool and work object are the controller's own
     "ur-base": {886},  # the tool is that of the installation
 }
