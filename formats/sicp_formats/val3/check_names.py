@@ -10,7 +10,7 @@ from sicp_cam.errors import printable
 from sicp_cam.findings import Level
 from sicp_formats.val3.check_files import Application
 from sicp_formats.val3.check_report import Report
-from sicp_formats.val3.check_words import RESERVED
+from sicp_formats.val3.words import RESERVED
 
 __all__ = ["check_names"]
 

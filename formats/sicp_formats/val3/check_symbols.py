@@ -12,7 +12,7 @@ from sicp_formats.robot.program import Statement
 from sicp_formats.val3.check_files import Application, Code
 from sicp_formats.val3.check_report import Report
 from sicp_formats.val3.check_syntax import shape_of, strings_blank
-from sicp_formats.val3.check_words import INSTRUCTIONS, KEYWORDS, LITERALS, SCREEN
+from sicp_formats.val3.words import INSTRUCTIONS, KEYWORDS, LITERALS, SCREEN
 
 __all__ = ["check_symbols"]
 

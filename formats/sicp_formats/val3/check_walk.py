@@ -16,7 +16,7 @@ from sicp_formats.val3.check_moves import MOVE
 from sicp_formats.val3.check_report import Report
 from sicp_formats.val3.check_steps import Step, Walker, blend_of, pose_of
 from sicp_formats.val3.check_syntax import strings_blank
-from sicp_formats.val3.check_words import OUTPUTS, WAITS
+from sicp_formats.val3.words import OUTPUTS, WAITS
 
 __all__ = ["walk"]
 

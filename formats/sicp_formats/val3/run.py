@@ -17,6 +17,7 @@ from sicp_formats.val3.data import GEOMETRY
 from sicp_formats.val3.project import Program, Project
 from sicp_formats.val3.scope import Scope
 from sicp_formats.val3.stretch import Stretch, loop_stretch, plain_moves, poses_of
+from sicp_formats.val3.words import MOVES_NOTHING
 
 __all__ = ["Val3Runner"]
 
@@ -29,12 +30,6 @@ _DELAY = re.compile(r"delay[ \t]*\((.*)\)", re.ASCII)
 _POINT_FUNCTION = re.compile(r"([A-Za-z_]\w*)[ \t]*\((.*)\)", re.ASCII)
 _NAMES = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _ACTIVE = re.compile(r"\b(?:call|return)\b|\btask[a-z]|move[jlc]\b|\balter[a-z]", re.ASCII | re.I)
-_HARMLESS_WORDS = """
-    aioSet autoConnectMove close cls delay disablePower enablePower gotoxy logMsg open popUpMsg put putln resetMotion
-    restartMove setMoveId setPayload sioSet stopMove title userPage wait waitEndMove watch
-    dioLink aioLink sioLink
-"""
-_HARMLESS = frozenset(_HARMLESS_WORDS.split())
 _DEEPEST_APPRO = 8
 _SPEED_NOT_LIMITED = 9999.0
 _LANGUAGE = Language(
@@ -285,7 +280,7 @@ class Val3Runner(Runner):
                 self.moves.event(EventKind.DWELL, line, seconds, text)
                 return
         function = _FUNCTION.match(text)
-        if function is not None and function[1] in _HARMLESS:
+        if function is not None and function[1] in MOVES_NOTHING:
             self.keep(text, line)
         else:
             self.forget(text)

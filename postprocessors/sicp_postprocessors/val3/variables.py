@@ -119,9 +119,7 @@ def _mdesc(options: Val3Options, *, tmax: str, blend: str, zone: str) -> dict[st
     }
 
 
-def linked_variables(
-    events: Collection[Event], switched: Collection[str], options: Val3Options
-) -> dict[Variable, str]:
+def linked_variables(events: Collection[Event], switched: Collection[str], options: Val3Options) -> dict[Variable, str]:
     """Return the variables of inputs and outputs that the statements of the events use, and what they are linked to."""
     kinds = {event.kind for event in events}
     links: dict[Variable, str] = {}

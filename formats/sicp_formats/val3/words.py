@@ -1,4 +1,4 @@
-"""The words of VAL3 that a linter must know: keywords, literals, types and instructions of CS8 and CS9 controllers."""
+"""The words of VAL3 that a linter or reader must know: keywords, literals, types and instructions of CS8 and CS9 controllers."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ __all__ = [
     "INSTRUCTIONS",
     "KEYWORDS",
     "LITERALS",
+    "MOVES_NOTHING",
     "OUTPUTS",
     "RESERVED",
     "SCREEN",
@@ -90,3 +91,10 @@ _INSTRUCTIONS = """
 """
 INSTRUCTIONS = SCREEN | WAITS | OUTPUTS | frozenset(_INSTRUCTIONS.split())
 """Instructions and functions; those of add-ons begin with a dollar sign and are not listed."""
+
+_MOVES_NOTHING = """
+    aioSet autoConnectMove close cls delay disablePower enablePower gotoxy logMsg open popUpMsg put putln resetMotion
+    restartMove setMoveId setPayload sioSet stopMove title userPage wait waitEndMove watch dioLink aioLink sioLink
+"""
+MOVES_NOTHING = frozenset(_MOVES_NOTHING.split())
+"""Instructions that a reader of paths may keep as they stand: they neither move the arm nor change a point."""
