@@ -12,8 +12,8 @@ from sicp_formats.robot.motion import number_of
 from sicp_formats.robot.program import RobotError
 from sicp_formats.val3.check_files import Application
 from sicp_formats.val3.check_report import Report
-from sicp_formats.val3.words import ATTRIBUTES, BLENDS, CONFIGURATION, TYPES
 from sicp_formats.val3.data import Variable, Variables
+from sicp_formats.val3.words import ATTRIBUTES, BLENDS, CONFIGURATION, TYPES
 from sicp_formats.val3.xml import Element
 
 __all__ = ["check_data"]

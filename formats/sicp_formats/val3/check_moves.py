@@ -11,8 +11,8 @@ from sicp_formats.robot.program import split_arguments
 from sicp_formats.val3.check_files import Application, Code
 from sicp_formats.val3.check_report import Report
 from sicp_formats.val3.check_syntax import shape_of, strings_blank
-from sicp_formats.val3.words import BLENDS, CODE_ATTRIBUTES
 from sicp_formats.val3.data import ITEM
+from sicp_formats.val3.words import BLENDS, CODE_ATTRIBUTES
 
 __all__ = ["MOVE", "check_moves"]
 

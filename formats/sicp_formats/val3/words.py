@@ -1,4 +1,4 @@
-"""The words of VAL3 that a linter or reader must know: keywords, literals, types and instructions of CS8 and CS9 controllers."""
+"""The words of VAL3 that linter and reader know: keywords, literals, types and instructions of CS8 and CS9."""
 
 from __future__ import annotations
 
