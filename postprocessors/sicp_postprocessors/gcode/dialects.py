@@ -63,8 +63,6 @@ class Dialect:
     named
         "plain" or "upper": names hold letters, digits and underscores only, as they are or in capitals, and the file is
         called like the program; empty where the control takes the name of any file.
-    readable
-        False: no reader of ours knows the language.
     number
         Template of the O line, empty where programs have no numbers; `smallest_number` where one must have it.
     tool, spindle, pause, stop
@@ -99,7 +97,6 @@ class Dialect:
     first: tuple[str, ...] = ()
     last: tuple[str, ...] = ("M30",)
     named: str = ""
-    readable: bool = True
     number: str = ""
     smallest_number: int | None = None
     tool: tuple[str, ...] = ("T{tool} M6",)
@@ -183,7 +180,6 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             vector_codes=("LN", "LN", " FMAX"),
             sign="+",
             named="upper",
-            readable=False,
             first=("BEGIN PGM {name} MM",),
             last=("M30", "END PGM {name} MM"),
             tool=("TOOL CALL {tool} Z",),

@@ -79,8 +79,6 @@ class GCode(LinePostprocessor):
     def reading(self) -> Mapping[str, object] | str:
         """Return how the reader understands the rotary words, or why it cannot compare the program with the path."""
         options = self.options
-        if not self._control.readable:
-            return "no reader knows conversational programs"
         if options.axis_step_deg is not None:
             return "its moves may have been divided"
         if options.max_moves_per_program is not None:
