@@ -168,7 +168,8 @@ class TestWords:
     def test_what_reads_the_programs_back_is_told_the_axes(self):
         assert GCode({"dialect": "haas", "machine": "table-bc"}).reading() == {"rotary": "BC"}
         assert GCode({"dialect": "siemens"}).reading() == {}
-        for options in ({"dialect": "heidenhain"}, {"dialect": "haas", "machine": "nutating-head-bc"}, PLAIN):
+        assert GCode({"dialect": "heidenhain"}).reading() == {"rotary": "AC"}
+        for options in ({"dialect": "haas", "machine": "nutating-head-bc"}, PLAIN):
             assert isinstance(GCode(options).reading(), str)
 
     def test_block_numbers_begin_again(self):

@@ -272,6 +272,6 @@ class GCode(LinePostprocessor):
 
     def _listed_name(self, program: Program) -> str:
         name = re.sub("_+", "_", ascii_name(file_stem(program.name), _LONGEST_NAME, other="_")).strip("_")
-        # Siemens wants two letters first.
-        name = name if re.match("[A-Za-z]{2}", name) else f"PR_{name}"
+        if self._control.named == "plain" and not re.match("[A-Za-z]{2}", name):
+            return f"PR_{name}"
         return name.upper() if self._control.named == "upper" else name
