@@ -179,7 +179,7 @@ def _begins(file: Path, of_project: set[Path], files: list[Path]) -> bool:
     if plugins.suffix_of(file) in ("pjx", "pgf"):
         return True
     part = _PART.fullmatch(file.stem)
-    whole = {file.with_suffix(".pgf")} if plugins.suffix_of(file) == "mod" else set()
+    whole = {file.with_suffix(".pgf")} if plugins.suffix_of(file) in ("mod", "modx") else set()
     if part is not None:
         whole |= {file.with_name(part[1] + file.suffix), file.with_name(part[1] + ".pgf")}
     return not (any(folder in of_project for folder in file.parents) or whole & set(files))

@@ -191,7 +191,7 @@ class Rapid(ControllerPostprocessor):
 
     def program_files(self, program: Program, name: str) -> dict[str, bytes]:
         """Return NAME.mod; and the other modules with NAME.pgf, where parts are modules."""
-        bodies = self.bodies(program)
+        bodies, suffix = self.bodies(program), self.options.module_suffix
         names = self.part_names(name, len(bodies))
         first = "main" if self.options.entry == "main" else f"run_{name}"[:32]
         calls = [f"{part}p;" for part in names] or bodies[0]
@@ -200,12 +200,12 @@ class Rapid(ControllerPostprocessor):
         if self.options.split == "procedures" or not parts:
             for part in parts.values():
                 routines |= part
-            return {f"{name}.mod": self._module(name, self._data(program), routines)}
+            return {f"{name}.{suffix}": self._module(name, self._data(program), routines)}
         modules = {name: self._module(name, self._data(program), routines)}
         modules |= {part: self._module(part, (), routine) for part, routine in parts.items()}
-        listed = [f"  <Module>{module}.mod</Module>" for module in modules]
+        listed = [f"  <Module>{module}.{suffix}</Module>" for module in modules]
         pgf = ['<?xml version="1.0" encoding="ISO-8859-1" ?>', "<Program>", *listed, "</Program>"]
-        return {f"{name}.pgf": self.encoded(pgf)} | {f"{module}.mod": text for module, text in modules.items()}
+        return {f"{name}.pgf": self.encoded(pgf)} | {f"{module}.{suffix}": text for module, text in modules.items()}
 
     def _module(self, name: str, data: Iterable[str], routines: Mapping[str, Sequence[str]]) -> bytes:
         lines = [f"MODULE {name}", *(f"  {line}" for line in data)]

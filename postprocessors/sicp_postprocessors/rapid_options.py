@@ -32,7 +32,9 @@ class RapidOptions(ControllerOptions):
     entry: Literal["main", "run"] = "main"
     """Name of the first procedure: `main`, or run_NAME to be called by a program of your own."""
     split: Literal["procedures", "modules"] = "procedures"
-    """Parts of a long path as procedures of the one module, or as modules NAME_001.mod ... that NAME.pgf lists."""
+    """Parts of a long path as procedures of the one module, or as modules NAME_001 ... that NAME.pgf lists."""
+    module_suffix: Literal["mod", "modx"] = "mod"
+    """Suffix of module files: mod for IRC5, modx for OmniCore (RobotWare 7)."""
     quaternion_decimals: Annotated[int, Between(5, 9)] = 7
     """Decimals of quaternions."""
 

@@ -412,6 +412,14 @@ def test_long_paths_are_divided_at_retracts_and_do_the_same(post, options):
     assert read_back(divided, program, files).facts["count"] == 60
 
 
+@pytest.mark.parametrize("split", ["procedures", "modules"])
+def test_modules_may_have_the_suffix_of_newer_controllers(split):
+    made = Rapid({"module_suffix": "modx", "split": split, "max_moves_per_program": 3, "split_cuts": True})
+    files = made.write(simple_program())
+    assert {file.rsplit(".", 1)[1] for file in files} == ({"modx"} if split == "procedures" else {"modx", "pgf"})
+    assert read_back(made, simple_program(), files).facts["count"] == 6
+
+
 @EACH
 def test_a_cut_is_divided_only_where_that_is_asked_for(post):
     program = straight_program(30)

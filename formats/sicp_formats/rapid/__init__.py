@@ -43,7 +43,7 @@ def read_path(
     Parameters
     ----------
     path
-        The .mod or .prg file, or the .pgf that lists the modules beside it.
+        The .mod, .modx or .prg file, or the .pgf that lists the modules beside it.
     units
         Must be mm if it is given: RAPID knows no other unit.
     limits
