@@ -172,6 +172,11 @@ class TestWords:
         for options in ({"dialect": "haas", "machine": "nutating-head-bc"}, PLAIN):
             assert isinstance(GCode(options).reading(), str)
 
+    @pytest.mark.parametrize(("ends", "count"), [("lf", 0), ("crlf", 1)])
+    def test_line_ends(self, ends, count):
+        (content,) = GCode({"line_ends": ends}).write(simple_program()).values()
+        assert content.count(b"\r\n") == count * content.count(b"\n") and content.endswith(b"\n")
+
     def test_block_numbers_begin_again(self):
         lines = lines_of({"line_numbers": 100}, straight_program(1200))
         numbers = [int(line[1:].split()[0]) for line in lines if line[0] == "N"]
@@ -374,6 +379,12 @@ class TestWithoutTipControl:
             PathError, match=r"move 2, line 12: without tip control the tip leaves its straight way by up"
         ):
             post.write(program)
+
+    def test_a_part_that_stands_turned_is_refused(self):
+        pose = np.eye(4)
+        pose[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
+        with pytest.raises(PathError, match=r"no work offset can turn it: .* --frame scan"):
+            GCode(PLAIN).write(simple_program(T_scan_program=pose))
 
     def test_one_length_does_for_one_tool_only(self, tmp_path):
         fork = tmp_path / "fork.toml"

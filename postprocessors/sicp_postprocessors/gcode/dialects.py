@@ -61,7 +61,7 @@ class Dialect:
     program
         Lines before and after everything else, `{name}` and `{unit}` within.
     named
-        "plain" or "upper": names hold letters, digits and underscores only, two letters first or all in capitals, and the
+        "plain" or "upper": names hold letters, digits and underscores only, two letters first or all capitals; the
         file is called like the program; empty where the control takes the name of any file.
     number
         Template of the O line, empty where programs have no numbers; `smallest_number` where one must have it.

@@ -14,7 +14,7 @@ import numpy as np
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS
 from sicp_cam.model import BoolArray, FloatArray, IntArray, Program
-from sicp_postprocessors.checks import frame_name, stretch_findings
+from sicp_postprocessors.checks import frame_name, in_scan_frame, stretch_findings
 from sicp_postprocessors.gcode.along import Angles, over_travel
 from sicp_postprocessors.gcode.divide import axis_turns_deg
 from sicp_postprocessors.gcode.feeds import LEAST_INVERSE
@@ -195,6 +195,12 @@ def without_tip_findings(
     if positions.angles is None or options.knows_tip:
         return
     written = positions.program.path
+    if not in_scan_frame(program):
+        message = (
+            "without tip control X Y Z hold for a part that stands as in the program, and no work offset can turn it: "
+            "put the whole correction into the points, by --frame scan"
+        )
+        yield Finding(626, Level.FAIL, message)
     if setting.machine.kind != "table-table" and len(set(tools_in_use(written).tolist()) - {-1}) > 1:
         message = (
             f"the path uses several tools, but X Y Z hold for one length, {flag(post, 'tool_length_mm', 'mm')}: "

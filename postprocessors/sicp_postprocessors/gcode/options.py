@@ -61,6 +61,8 @@ class GCodeOptions(PreflightOptions):
     """Tool in the spindle at the start, for its H word, where the path does not say it; 0 writes no H word."""
     line_numbers: Annotated[int, Between(0, 100)] = 0
     """Step of the block numbers; 0 writes none, but for Heidenhain, which counts each line."""
+    line_ends: Literal["lf", "crlf"] = "lf"
+    """How lines end in the file."""
     decimals: Annotated[int | None, Between(3, 7)] = None
     """Decimals of positions: by default 4 in mm and 6 in inch."""
     vector_decimals: Annotated[int | None, Between(5, 9)] = None

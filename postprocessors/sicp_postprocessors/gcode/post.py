@@ -69,6 +69,7 @@ class GCode(LinePostprocessor):
         super().__init__(options)
         self._control = self.options.control
         self.suffix = self._control.suffix  # type: ignore[misc]  # a default of the class, which the dialect replaces
+        self.line_end = "\r\n" if self.options.line_ends == "crlf" else "\n"  # type: ignore[misc]  # as chosen
         self._setting = self._set_up() if self.options.words == "rotary" else None
         self._last: tuple[Program, Positions] | None = None
 
