@@ -55,7 +55,7 @@ class Rapid(ControllerPostprocessor):
     options: RapidOptions
     suffix = ".mod"
     line_end = "\r\n"
-    longest_name = 32
+    longest_name = 31  # of 32: the procedure of a part has one letter more than its module
     reserved = frozenset(_RESERVED.split())
     largest_mm_s = 7000.0
     convention = "mm and quaternions, scalar first"
