@@ -26,6 +26,7 @@ from sicp_postprocessors.moves import Moves
 from sicp_postprocessors.numbers import fixed
 from sicp_postprocessors.options import flag
 from sicp_postprocessors.orientations import Six, pose_from_zyx
+from sicp_postprocessors.robot import stop_words
 from sicp_postprocessors.rows import rows, words
 from sicp_postprocessors.text import ascii_line, ascii_lines
 
@@ -90,7 +91,7 @@ class FanucLs(ControllerPostprocessor):
 
     def operator(self, text: str) -> Iterator[str]:
         """Return a message, and a pause that the start key ends."""
-        told = ascii_line(f"stop {text}", drop="[];'")[:_LONGEST_MESSAGE].strip()
+        told = ascii_line(stop_words(text), drop="[];'")[:_LONGEST_MESSAGE].strip()
         yield f"  MESSAGE[{told}] ;"
         yield "  PAUSE ;"
 

@@ -21,7 +21,7 @@ from sicp_postprocessors.moves import Moves
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.orientations import Six, pose_from_zyx, quaternions
 from sicp_postprocessors.rapid_options import RapidOptions
-from sicp_postprocessors.robot import ZERO
+from sicp_postprocessors.robot import ZERO, stop_words
 from sicp_postprocessors.rows import rows, words
 from sicp_postprocessors.text import ascii_line
 
@@ -88,7 +88,7 @@ class Rapid(ControllerPostprocessor):
 
     def operator(self, text: str) -> Iterator[str]:
         """Return a message on the pendant, and a stop that the start key ends."""
-        told = ascii_line(f"stop {text}", drop='"\\')[:_LONGEST_MESSAGE].strip()
+        told = ascii_line(stop_words(text), drop='"\\')[:_LONGEST_MESSAGE].strip()
         yield f'TPWrite "{told}";'
         yield "Stop;"
 

@@ -27,7 +27,7 @@ from sicp_postprocessors.robot_options import RobotOptions, output_words
 from sicp_postprocessors.template import LinePostprocessor
 from sicp_postprocessors.zones import passed_points, zones_mm
 
-__all__ = ["ZERO", "RobotPostprocessor"]
+__all__ = ["ZERO", "RobotPostprocessor", "stop_words"]
 
 ZERO: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _FEED_DECIMALS = 6
@@ -116,7 +116,7 @@ class RobotPostprocessor(LinePostprocessor):
     def stop(self, text: str) -> Iterator[str]:
         """Return a stop at rest that the operator ends."""
         yield from self.wait()
-        yield from self.comments(f"stop {text}")
+        yield from self.comments(stop_words(text))
         yield from self.operator(text)
 
     # --- the path as a robot takes it ---
@@ -162,9 +162,15 @@ class RobotPostprocessor(LinePostprocessor):
         """Return the events as the program tells them, with what a person must do in its place.
 
         A tool change by hand needs the spindle off before it, and a stop behind it. A spindle that no output starts is
-        started by the operator, for whom the program stops; what no output switches off is told in a comment.
+        started by the operator, for whom the program stops; what no output switches off is told in a comment. Nor does
+        the arm move before the operator has seen that tool or cell are not those of the robot.
         """
-        return [self._told_by_hand(event) for event in self._with_tool_changes(program)]
+        return [*self._not_stated(), *(self._told_by_hand(event) for event in self._with_tool_changes(program))]
+
+    def _not_stated(self) -> list[Event]:
+        known = {"tool": self.options.tool_is_known, "cell": self.options.cell_is_known}
+        missing = " and ".join(name for name, is_known in known.items() if not is_known)
+        return [Event(0, EventKind.STOP, 0.0, f"teach {missing}, not stated")] if missing else []
 
     def _with_tool_changes(self, program: Program) -> list[Event]:
         told: list[Event] = []
@@ -281,3 +287,12 @@ class RobotPostprocessor(LinePostprocessor):
         if in_scan_frame(program):
             return f"{named} is the pose of the {frame_name(program)} frame in the robot's world: the option cell"
         return f"{named} is the pose of the part in the robot's world: the option cell times its pose in the scan frame"
+
+
+def stop_words(text: str) -> str:
+    """Return what a stop says to the operator.
+
+    >>> stop_words("turn the part over"), stop_words("")
+    ('stop: turn the part over', 'stop')
+    """
+    return f"stop: {text}" if text.strip() else "stop"

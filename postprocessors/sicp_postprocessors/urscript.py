@@ -24,6 +24,7 @@ from sicp_postprocessors.controllers import ControllerOptions, ControllerPostpro
 from sicp_postprocessors.moves import Moves
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.orientations import Six, rotation_vectors
+from sicp_postprocessors.robot import stop_words
 from sicp_postprocessors.rows import rows
 from sicp_postprocessors.text import ascii_line
 
@@ -128,7 +129,7 @@ class UrScript(ControllerPostprocessor):
 
     def operator(self, text: str) -> Iterator[str]:
         """Return a message that holds the program until the operator lets it go on."""
-        told = ascii_line(f"stop {text}", drop='"\\')[:_LONGEST_MESSAGE].strip()
+        told = ascii_line(stop_words(text), drop='"\\')[:_LONGEST_MESSAGE].strip()
         yield f'popup("{told}", title="Stop", blocking=True)'
 
     def setup(self, program: Program) -> Iterator[str]:

@@ -41,7 +41,7 @@ OUTPUTS = {"krl": ("3", "4"), "rapid": ("doSpindle", "doCool"), "ls": ("3", "RO4
 
 def with_outputs(post, **more):
     spindle, coolant = OUTPUTS[post.name]
-    return post({"spindle_output": spindle, "coolant_output": coolant, **more})
+    return post({"spindle_output": spindle, "coolant_output": coolant, **GIVEN, **more})
 
 
 def run(post, program):
@@ -535,7 +535,7 @@ def test_comments_open_no_fold_and_end_no_statement():
 def test_messages_hold_nothing_that_ends_a_text():
     program = straight_program(3, events=(Event(1, EventKind.STOP, 0.0, NASTY),))
     for post in CONTROLLERS:
-        again = run(post(), program)
+        again = run(post(GIVEN), program)
         assert [kind for kind, _ in again.actions].count("stop") == 1
         assert post().preflight(program)[0].level is not Level.FAIL
 

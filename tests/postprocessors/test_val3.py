@@ -22,6 +22,7 @@ from sicp_postprocessors.val3 import Val3, application_name
 from sicp_postprocessors.val3.xml import S7, Variable
 
 MOVES = ("movej", "movel")
+PLACED = {"tool": "0,0,150,0,0,0", "cell": "0,0,0,0,0,0"}
 TEST_VECTOR = np.array(
     [[0.813798, -0.469846, 0.342020], [0.543838, 0.823173, -0.163176], [-0.204874, 0.318796, 0.925417]]
 )
@@ -130,7 +131,7 @@ class TestProgram:
 
     def test_events_wait_for_the_end_of_the_move(self):
         linked = {"spindle_output": "B\\%Q0", "coolant_output": "B\\%Q1"}
-        _, result = read_val3(Val3(linked).write(simple_program()))
+        _, result = read_val3(Val3(linked | PLACED).write(simple_program()))
         actions = [a for a in result.actions if a[0] != "comment" or a[1] in ("first side", "tool 3 LOADTL/3")]
         told = [(kind, value["index"]) if kind in MOVES else (kind, value) for kind, value in actions]
         assert told == [
@@ -186,7 +187,7 @@ class TestProgram:
     def test_only_words_that_both_controllers_know(self):
         code = "\n".join(load_val3(Val3({"log_messages": True}).write(simple_program())).code["start"])
         assert not re.search(r"\b(putln|userPage|gotoxy|cls|popUpMsg)\b", code)
-        assert 'logMsg("stop STOP")' in code
+        assert 'logMsg("stop: STOP")' in code
 
     def test_first_point_has_the_chosen_configuration(self):
         post = Val3({"shoulder": "lefty", "elbow": "epositive", "wrist": "wnegative"})
@@ -438,18 +439,30 @@ class TestSpindleAndTools:
             Event(1, EventKind.COOLANT, 1.0),
             Event(3, EventKind.SPINDLE, 0.0),
         )
-        app, result = read_val3(Val3().write(straight_program(3, events=events)))
+        app, result = read_val3(Val3(PLACED).write(straight_program(3, events=events)))
         assert not any(name.startswith("do") for name in app.data)
-        start = result.actions.index(("comment", "stop start the spindle: 5000 rev/min clockwise"))
+        start = result.actions.index(("comment", "stop: start the spindle: 5000 rev/min clockwise"))
         assert [kind for kind, _ in result.actions[start + 1 : start + 4]] == ["reset", "operator", "movej"]
         told = [value for kind, value in result.actions if kind == "comment"]
         assert "coolant on: no output is named for it" in told and "spindle off: no output is named for it" in told
         # A drive that a speed starts needs no output; one direction alone does not stand for the other.
         speed = {"spindle_speed": "aio", "spindle_speed_output": "B\\%A0", "spindle_speed_scale": 0.001}
-        _, result = read_val3(Val3(speed).write(straight_program(3, events=events)))
+        _, result = read_val3(Val3(speed | PLACED).write(straight_program(3, events=events)))
         assert ("analog", ("aoSpindle", "5")) in result.actions and "operator" not in dict(result.actions)
-        _, result = read_val3(Val3({"spindle_ccw_output": "B\\%Q1"}).write(straight_program(3, events=events)))
+        _, result = read_val3(Val3(PLACED | {"spindle_ccw_output": "B\\%Q1"}).write(straight_program(3, events=events)))
         assert "operator" in dict(result.actions)
+
+    def test_an_arm_whose_tool_or_cell_is_not_stated_waits_for_the_operator(self):
+        for options, words in (
+            ({}, ["stop: teach tool and cell, not stated"]),
+            ({"tool": PLACED["tool"]}, ["stop: teach cell, not stated"]),
+            ({"cell": PLACED["cell"]}, ["stop: teach tool, not stated"]),
+            (PLACED, []),
+        ):
+            _, result = read_val3(Val3(options).write(straight_program(3)))
+            first = [kind for kind, _ in result.actions].index("movej")
+            told = [value for kind, value in result.actions[:first] if kind == "comment" and value.startswith("stop")]
+            assert told == words and ("operator" in [kind for kind, _ in result.actions[:first]]) is bool(words)
 
     def test_a_later_tool_stops_the_spindle_and_waits(self):
         events = (
@@ -467,7 +480,7 @@ class TestSpindleAndTools:
             ("output", ("doSpindle", "false")),
             ("comment", "tool 2"),
             ("waitEndMove", None),
-            ("comment", "stop tool 2"),
+            ("comment", "stop: tool 2"),
             ("operator", ("diContinue", "false")),
             ("operator", ("diContinue", "true")),
         ]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from sicp_cam.model import Program
 from sicp_postprocessors.numbers import trimmed
-from sicp_postprocessors.robot import RobotPostprocessor
+from sicp_postprocessors.robot import RobotPostprocessor, stop_words
 from sicp_postprocessors.text import ascii_line
 from sicp_postprocessors.val3.options import Val3Options
 
@@ -50,7 +50,7 @@ class Val3Words(RobotPostprocessor):
     def operator(self, text: str) -> Iterator[str]:
         """Return the wait for an input, or for a variable that the operator sets."""
         if self.options.log_messages:
-            yield f'logMsg("{ascii_line(f"stop {text}", drop=chr(34) + chr(92))[:60]}")'
+            yield f'logMsg("{ascii_line(stop_words(text), drop=chr(34) + chr(92))[:60]}")'
         if self.options.continue_input:
             # A whole press: an input that is still on from the stop before does not count.
             yield "wait(diContinue==false)"

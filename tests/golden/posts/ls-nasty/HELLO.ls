@@ -42,9 +42,9 @@ CONTROL_CODE    = 00000000 00000000;
   22:J P[1] 10% FINE    ;
   23:  !Hello "Robots" Next (x) , % ' ;
   24:  !]]> e ? ;
-  25:  !stop Hello "Robots" Next (x) , % ;
-  26:  !' ]]> e ? ;
-  27:  MESSAGE[stop Hello "Robots" Next] ;
+  25:  !stop: Hello "Robots" Next (x) , ;
+  26:  !% ' ]]> e ? ;
+  27:  MESSAGE[stop: Hello "Robots" Nex] ;
   28:  PAUSE ;
   29:L P[2] 10mm/sec FINE    ;
 /POS

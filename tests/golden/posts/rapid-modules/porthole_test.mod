@@ -18,51 +18,51 @@ MODULE porthole_test
     ConfJ \Off;
     MoveJ [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vStart,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the tip is at 50 mm above the origin of the frame, along
+    ! stop: see that the tip is at 50 mm above the origin of the frame, along
     ! its Z
-    TPWrite "stop see that the tip is at 50 mm above";
+    TPWrite "stop: see that the tip is at 50 mm above";
     Stop;
     MoveL [[50.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the tip has moved 50 mm along +X of the frame
-    TPWrite "stop see that the tip has moved 50 mm al";
+    ! stop: see that the tip has moved 50 mm along +X of the frame
+    TPWrite "stop: see that the tip has moved 50 mm a";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the tip is back
-    TPWrite "stop see that the tip is back";
+    ! stop: see that the tip is back
+    TPWrite "stop: see that the tip is back";
     Stop;
     MoveL [[0.0000,50.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the tip has moved 50 mm along +Y of the frame
-    TPWrite "stop see that the tip has moved 50 mm al";
+    ! stop: see that the tip has moved 50 mm along +Y of the frame
+    TPWrite "stop: see that the tip has moved 50 mm a";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the tip is back
-    TPWrite "stop see that the tip is back";
+    ! stop: see that the tip is back
+    TPWrite "stop: see that the tip is back";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,0.9914449,0.0000000,-0.1305262],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the holder leans 15 degrees towards +X, the tip has not
+    ! stop: see that the holder leans 15 degrees towards +X, the tip has not
     ! moved
-    TPWrite "stop see that the holder leans 15 degree";
+    TPWrite "stop: see that the holder leans 15 degre";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the holder is back
-    TPWrite "stop see that the holder is back";
+    ! stop: see that the holder is back
+    TPWrite "stop: see that the holder is back";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.1305262,0.9914449,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the holder leans 15 degrees towards +Y, the tip has not
+    ! stop: see that the holder leans 15 degrees towards +Y, the tip has not
     ! moved
-    TPWrite "stop see that the holder leans 15 degree";
+    TPWrite "stop: see that the holder leans 15 degre";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop see that the holder is back
-    TPWrite "stop see that the holder is back";
+    ! stop: see that the holder is back
+    TPWrite "stop: see that the holder is back";
     Stop;
   ENDPROC
 ENDMODULE

@@ -17,12 +17,16 @@ MODULE HelloRobotsNextxe
     ! at most
     ConfL \Off;
     ConfJ \Off;
+    WaitRob \InPos;
+    ! stop: teach tool and cell, not stated
+    TPWrite "stop: teach tool and cell, not stated";
+    Stop;
     ! tool 1 Hello "Robots" Next (x) ; % ' ]]> e ?
     MoveJ [[0.0000,0.0000,5.0000],[0.0000000,0.9894004,0.0000000,-0.1452131],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vStart,fine,tTool1\WObj:=wPart;
     ! Hello "Robots" Next (x) ; % ' ]]> e ?
     WaitRob \InPos;
-    ! stop Hello "Robots" Next (x) ; % ' ]]> e ?
-    TPWrite "stop Hello Robots Next (x) ; % ' ]]> e ?";
+    ! stop: Hello "Robots" Next (x) ; % ' ]]> e ?
+    TPWrite "stop: Hello Robots Next (x) ; % ' ]]> e";
     Stop;
     MoveL [[10.0000,0.0000,5.0000],[0.1229484,0.9893538,-0.0096024,-0.0772694],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool1\WObj:=wPart;
   ENDPROC
