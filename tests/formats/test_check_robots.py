@@ -206,3 +206,33 @@ def test_a_tool_of_another_module_is_told_once(tmp_path):
     lines = [line for line in RAPID.splitlines() if "tooldata" not in line]
     found = check_rapid(written(tmp_path, "rapid", "\n".join(lines)))
     assert [(f.code, f.where[-6:]) for f in found] == [(886, "line 6")]
+
+
+def test_programs_that_are_called_are_checked_with_what_rules_then(tmp_path):
+    """The frames of the program that calls hold in the one that is called; defects are told in their own file."""
+    main, moves = KRL.partition("LIN {X 110} C_DIS\n")[::2]
+    file = written(tmp_path, "krl", f"{main}trim_001( )\nEND\n")
+    part = tmp_path / "TRIM_001.SRC"
+    part.write_text(f"DEF trim_001( )\nLIN {{X 110}} C_DIS\n{moves}", encoding="ascii")
+    assert check_krl(file) == ()
+    part.write_text(part.read_text().replace("LIN {Z 50}", "LIN XP7"), encoding="ascii")
+    assert [(f.code, f.where) for f in check_krl(file)] == [(882, f"{part}, line 4")]
+
+
+def test_listings_that_are_called_are_checked_with_the_frames_that_are_chosen(tmp_path):
+    text = LS.replace("LINE_COUNT = 6", "LINE_COUNT = 7").replace("/POS", "   7:  CALL PART ;\n/POS")
+    file = written(tmp_path, "ls", text)
+    called = (
+        f"/PROG  PART\n/MN\n   1:L P[1] 30mm/sec FINE ;\n/POS\nP[1]{{\n   GP1:\n{POINT.format(20, 50)}\n}};\n/END\n"
+    )
+    (tmp_path / "PART.LS").write_text(called, encoding="ascii")
+    assert check_ls(file) == ()
+    (tmp_path / "PART.LS").write_text(called.replace("UT : 1", "UT : 4"), encoding="ascii")
+    (found,) = check_ls(file)
+    assert (found.code, found.where) == (886, f"{tmp_path / 'PART.LS'}, line 3")
+
+
+def test_programs_that_call_each_other_are_checked_once(tmp_path):
+    file = written(tmp_path, "krl", KRL.replace("LIN {Z 50}", "LIN {Z 50}\nother( )"))
+    (tmp_path / "other.src").write_text("DEF other( )\ntrim( )\nother( )\nEND\n", encoding="ascii")
+    assert check_krl(file) == ()

@@ -15,6 +15,7 @@ from sicp_formats.fanuc_ls.listing import Listing, read_listing
 from sicp_formats.paths.defects import Check, Defects, check_characters, last_line
 from sicp_formats.paths.text import program_lines
 from sicp_formats.robot.check import check_declared, check_name
+from sicp_formats.robot.files import file_beside
 from sicp_formats.source import read_bytes
 
 __all__ = ["check"]
@@ -31,6 +32,8 @@ _SPEED = re.compile(r"\][ \t]*([0-9.]+)[ \t]*(%|mm/sec|cm/min|inch/min)", re.ASC
 _ROUNDING = re.compile(r"\bCNT[ \t]*([0-9]+)", re.ASCII)
 _ENDING = re.compile(r"\b(?:FINE|CNT|CD)[ \t]*[0-9R]*", re.ASCII)
 _CHOSEN = re.compile(r"(UFRAME|UTOOL)_NUM[ \t]*=[ \t]*([0-9]+)", re.ASCII)
+_CALL = re.compile(r"CALL[ \t]+([\w-]+)", re.ASCII)
+_MOST_FILES = 200
 _MM_S = {"mm/sec": 1.0, "cm/min": 1.0 / 6.0, "inch/min": 25.4 / 60.0}
 
 
@@ -40,26 +43,38 @@ def check(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[Finding, ...]
     Parameters
     ----------
     path
-        The .ls file.
+        The .ls file; listings beside it that it calls are checked too.
     limits
-        Caps on it.
+        Caps on the files.
 
     Raises
     ------
     FormatError
         If the file is no listing, or a statement or position is cut short or stands twice.
     """
+    found: dict[str, Defects] = {}
+    _check_file(path, limits, found, {})
+    return tuple(finding for defects in found.values() for finding in defects.findings())
+
+
+def _check_file(path: Path, limits: Limits, found: dict[str, Defects], chosen: dict[str, int]) -> None:
+    """Check a listing, and those beside it that it calls, with the frames that it has chosen."""
     lines = program_lines(path, read_bytes(path, limits), limits)
     listing = read_listing(path, lines)
-    defects = Defects(path)
+    defects = found[listing.name.upper()] = Defects(path)
     check_characters(defects, lines)
     _check_form(defects, lines, listing)
     _check_numbers(defects, lines)
-    _check_statements(defects, listing)
+    _check_statements(defects, listing, chosen)
     used = {int(number) for statement in listing.statements for number in _USED.findall(statement.text)}
     declared = {f"P[{number}]": position.line for number, position in listing.positions.items()}
     check_declared(defects, declared, (f"P[{number}]" for number in used), "position")
-    return defects.findings()
+    for statement in listing.statements:
+        called = _CALL.fullmatch(statement.text)
+        if called and called[1].upper() not in found and len(found) < _MOST_FILES:
+            beside = file_beside(path, called[1], ".ls")
+            if beside is not None:
+                _check_file(beside, limits, found, dict(chosen))
 
 
 def _check_form(defects: Defects, lines: Sequence[str], listing: Listing) -> None:
@@ -97,8 +112,7 @@ def _check_numbers(defects: Defects, lines: Sequence[str]) -> None:
             return
 
 
-def _check_statements(defects: Defects, listing: Listing) -> None:
-    chosen: dict[str, int] = {}
+def _check_statements(defects: Defects, listing: Listing, chosen: dict[str, int]) -> None:
     moved = False
     for statement in listing.statements:
         text, line = statement.text, statement.line

@@ -17,6 +17,7 @@ from sicp_formats.paths.arcs import Vector
 from sicp_formats.paths.defects import Check, Defects, check_characters, last_line
 from sicp_formats.paths.text import program_lines
 from sicp_formats.robot.check import Blend, check_blends, check_declared, check_name
+from sicp_formats.robot.files import file_beside
 from sicp_formats.robot.motion import number_of
 from sicp_formats.robot.program import split_arguments
 from sicp_formats.source import read_bytes
@@ -43,6 +44,8 @@ _DISTANCE = re.compile(r"\$APO\.CDIS[ \t]*=(.*)", re.ASCII | re.IGNORECASE)
 _TOOL = re.compile(r"\$TOOL\b|BAS[ \t]*\([ \t]*#TOOL|FDAT_ACT", re.ASCII | re.IGNORECASE)
 _BASE = re.compile(r"\$BASE\b|BAS[ \t]*\([ \t]*#BASE|FDAT_ACT", re.ASCII | re.IGNORECASE)
 _WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_CALL = re.compile(r"([A-Za-z_]\w*)[ \t]*\([ \t]*\)", re.ASCII)
+_MOST_FILES = 1000
 
 
 def check(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[Finding, ...]:
@@ -51,7 +54,7 @@ def check(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[Finding, ...]
     Parameters
     ----------
     path
-        The .src file; the .dat file of the same name beside it is checked too.
+        The .src file; the .dat file of the same name, and programs beside it that it calls, are checked too.
     limits
         Caps on the files.
 
@@ -60,20 +63,44 @@ def check(path: Path, *, limits: Limits = DEFAULT_LIMITS) -> tuple[Finding, ...]
     FormatError
         If a file is no text.
     """
-    lines = program_lines(path, read_bytes(path, limits), limits)
-    beside = data_file(path)
-    data = program_lines(beside, read_bytes(beside, limits), limits) if beside is not None else []
-    defects, of_data = Defects(path), Defects(beside or path)
-    check_characters(defects, lines)
-    check_characters(of_data, data)
-    points = _check_data(of_data, data, path) if beside is not None else {}
-    _check_heads(defects, lines, path)
-    program = _Program(defects, points)
-    for number, line in enumerate(lines, 1):
-        program.take(without_comment(line)[0], number)
-    program.finish()
-    check_declared(of_data, {name: line for name, (line, _) in points.items()}, program.used, "point")
-    return (*defects.findings(), *of_data.findings())
+    program = _Program(limits)
+    program.file(path)
+    for each in program.files:
+        each.finish(program.used)
+    return tuple(finding for each in program.files for finding in each.findings())
+
+
+class _File:
+    """A .src file and the .dat file beside it: their text, their defects, and the points that they declare.
+
+    `own` and `points` hold line and value of points by upper-case name: those of the .src, and those of the .dat file.
+    """
+
+    def __init__(self, path: Path, limits: Limits) -> None:
+        self.lines = program_lines(path, read_bytes(path, limits), limits)
+        self.defects = Defects(path)
+        self.own: dict[str, tuple[int, str]] = {}
+        self.points: dict[str, tuple[int, str]] = {}
+        self.blends: list[Blend] = []
+        self._of_data = Defects(path)
+        check_characters(self.defects, self.lines)
+        _check_heads(self.defects, self.lines, path)
+        beside = data_file(path)
+        if beside is not None:
+            self._of_data = Defects(beside)
+            data = program_lines(beside, read_bytes(beside, limits), limits)
+            check_characters(self._of_data, data)
+            self.points = _check_data(self._of_data, data, path)
+
+    def finish(self, used: set[str]) -> None:
+        """Judge what only the whole program shows."""
+        check_blends(self.defects, self.blends)
+        for defects, points in ((self.defects, self.own), (self._of_data, self.points)):
+            check_declared(defects, {name: line for name, (line, _) in points.items()}, used, "point")
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return the findings of both files."""
+        return (*self.defects.findings(), *self._of_data.findings())
 
 
 def _check_heads(defects: Defects, lines: Sequence[str], path: Path) -> None:
@@ -115,38 +142,54 @@ def _stem(path: Path) -> str:
 
 
 class _Program:
-    """What the statements so far have said."""
+    """What the statements so far have said, those of called programs beside the first one among them."""
 
-    def __init__(self, defects: Defects, points: dict[str, tuple[int, str]]) -> None:
+    def __init__(self, limits: Limits) -> None:
         self.used: set[str] = set()
-        self._defects = defects
-        self._values = {name: value for name, (_, value) in points.items()}
-        self._own: dict[str, int] = {}
+        self.files: list[_File] = []
+        self._limits = limits
+        self._names: set[str] = set()
+        self._values: dict[str, str] = {}
         self._speed = self._tool = self._base = self._moved = False
         self._zone_mm = 0.0
         self._tip: dict[str, float] = {}
-        self._blends: list[Blend] = []
+        self._here: _File
+        self._defects: Defects
 
-    def take(self, code: str, line: int) -> None:
+    def file(self, path: Path) -> None:
+        """Check the statements of a file in its order, and those of files that it calls where it calls them."""
+        here = _File(path, self._limits)
+        self.files.append(here)
+        self._names.add(_stem(path).upper())
+        self._values |= {name: value for name, (_, value) in here.points.items()}
+        for number, line in enumerate(here.lines, 1):
+            code = without_comment(line)[0]
+            called = _CALL.fullmatch(code)
+            if called and (beside := self._beside(path, called[1])) is not None:
+                self.file(beside)
+            elif code:
+                self._take(here, code, number)
+
+    def _beside(self, path: Path, name: str) -> Path | None:
+        """Return the file of a called program, None if there is none or it was checked before."""
+        if name.upper() in self._names or len(self._names) > _MOST_FILES:
+            return None
+        return file_beside(path, name, ".src")
+
+    def _take(self, here: _File, code: str, line: int) -> None:
         """Check one statement."""
-        if not code:
-            return
+        self._here, self._defects = here, here.defects
         move = _MOVE.match(code)
         if move is not None:
             self._move(move[1].upper(), bool(move[2]), move[3], line)
             return
         if point := _POINT.fullmatch(code):
-            self._own[point[1].upper()] = line
+            here.own[point[1].upper()] = (line, point[2] or "")
             self._values[point[1].upper()] = point[2] or ""
         elif "$" in code or "BAS" in code.upper() or "_ACT" in code.upper():
             self._setting(code, line)
         else:
             self.used.update(word.upper() for word in _WORD.findall(code))
-
-    def finish(self) -> None:
-        """Judge what only the whole program shows."""
-        check_blends(self._defects, self._blends)
-        check_declared(self._defects, self._own, self.used, "point")
 
     def _setting(self, code: str, line: int) -> None:
         self.used.update(word.upper() for word in _WORD.findall(code))
@@ -178,7 +221,7 @@ class _Program:
         zone = self._zone_mm if linear and _CARTESIAN_ZONE.search(rest) else 0.0
         points = split_arguments(_ZONE.split(rest)[0].split(" WITH ")[0])
         tips = [self._point(point, relative, line) for point in points]
-        self._blends.append(Blend(tips[-1] if tips else None, zone, line))
+        self._here.blends.append(Blend(tips[-1] if tips else None, zone, line))
 
     def _first_move(self, word: str, linear: bool, line: int) -> None:
         self._moved = True
