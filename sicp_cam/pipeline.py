@@ -113,7 +113,8 @@ def _corrected_and_written(job: Job, progress: Progress) -> Outcome:
         reports, failed = report_files(correction, job.report, correction.document())
     timing = {**correction.timing_s, **clock.seconds, "total": round(time.perf_counter() - started, 4)}
     correction = replace(correction, findings=correction.findings + failed, timing_s=timing)
-    entries = [output_entry("program", name, content) for name, content in programs.items()]
+    main = dict(correction.reading(post, job.post_options.get(post), files) for post, (files, _) in written.items())
+    entries = [output_entry("program", name, content, main.get(name)) for name, content in programs.items()]
     entries += [output_entry("report", name, content) for name, content in reports.items()]
     document = correction.document(entries)
     files = programs | reports | {output.MANIFEST: _json_bytes(document)}

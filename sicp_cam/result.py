@@ -116,6 +116,14 @@ class Correction:
         back = read_back(writer, program, files, limits=self.job.limits)
         return files, (*noticed, *back.findings)
 
+    def reading(
+        self, post: str, options: Mapping[str, object] | None, files: Mapping[str, bytes]
+    ) -> tuple[str, dict[str, Any] | str]:
+        """Return the file by which a program is read, and what its reader must be told, or why none reads it."""
+        writer = plugins.postprocessor(post, options or {})
+        told = writer.reading()
+        return writer.main_file(files), told if isinstance(told, str) else dict(told)
+
     def write(self, post: str, out: str | Path, *, force: bool = False, **options: object) -> list[Path]:
         """Write the program for one controller into a folder and return the files.
 

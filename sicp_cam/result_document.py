@@ -76,9 +76,15 @@ def input_entry(role: str, source: Source | None, count: int) -> dict[str, Any]:
     }
 
 
-def output_entry(kind: str, path: str, content: bytes) -> dict[str, Any]:
-    """Return one output file, its path relative to the folder of the results."""
-    return {"kind": kind, "path": path, "sha256": hashlib.sha256(content).hexdigest()}
+def output_entry(
+    kind: str, path: str, content: bytes, reading: Mapping[str, Any] | str | None = None
+) -> dict[str, Any]:
+    """Return one output file, its path relative to the folder of the results.
+
+    `reading` stands at the file by which a program is read: what its reader must be told, or why none reads it.
+    """
+    entry = {"kind": kind, "path": path, "sha256": hashlib.sha256(content).hexdigest()}
+    return entry if reading is None else {**entry, "reading": reading}
 
 
 def registration_entry(registration: Registration) -> dict[str, Any]:

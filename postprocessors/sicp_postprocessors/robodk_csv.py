@@ -52,7 +52,8 @@ class RoboDkCsv(Postprocessor):
     summary = "table X,Y,Z,W,P,R,number,mm/s,rapid for RoboDK, without a header"
     Options = RoboDkCsvOptions
     options: RoboDkCsvOptions
-    suffix = ".csv"
+    suffix = "_robodk.csv"
+    """Beside the table of the post `csv`, which has the plain name."""
 
     def preflight(self, program: Program) -> list[Finding]:
         """Return the findings of every post, and what a table cannot hold: events and the program frame."""
@@ -83,7 +84,7 @@ class RoboDkCsv(Postprocessor):
         template = ",".join([f"{{:.{d}}}"] * 3 + [f"{{:.{a}}}"] * 3 + ["{:d}", "{:.5}", "{:d}", "{}"])
         columns = (*path.tips_mm.T, *self.angles_deg(path).T, np.arange(len(path)), feeds, path.rapid, notes)
         text = "\n".join([*rows(template, *columns), ""])
-        return {f"{file_stem(program.name)}.csv": text.encode("ascii")}
+        return {f"{file_stem(program.name)}{self.suffix}": text.encode("ascii")}
 
     def angles_deg(self, path: ToolPath) -> FloatArray:
         """Return W, P, R (n, 3) of the tool of every move, its Z against the axis."""

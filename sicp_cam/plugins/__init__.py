@@ -190,7 +190,7 @@ def writable_roles(path: Path) -> tuple[str, ...]:
 def writable_suffixes() -> tuple[str, ...]:
     """Return the suffixes of everything that can be written into one file, in order."""
     scans_and_parts = {name.partition(".")[2] for name in owners(WRITERS)}
-    posts = {getattr(owner(each).load(), "suffix", "").removeprefix(".") for each in owners(POSTPROCESSORS).values()}
+    posts = {getattr(owner(each).load(), "suffix", "").rpartition(".")[2] for each in owners(POSTPROCESSORS).values()}
     return tuple(sorted((scans_and_parts | posts) - {""}))
 
 

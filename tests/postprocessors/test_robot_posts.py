@@ -542,7 +542,7 @@ def test_messages_hold_nothing_that_ends_a_text():
 
 def test_a_table_for_robodk_says_in_its_first_row_what_it_is():
     files = RoboDkCsv().write(simple_program(overridden=("gate, x",)))
-    rows = files["porthole.csv"].decode().splitlines()
+    rows = files["porthole_robodk.csv"].decode().splitlines()
     assert rows[0].endswith(",porthole / corrected by sicp_cam / gates: all passed / gate x / not a safety function: "
                             "verify at reduced speed")  # fmt: skip
     assert rows[1].endswith(",1,33.33333,0,") and rows[0].count(",") == rows[1].count(",") == 9

@@ -29,8 +29,7 @@ class GCodeOptions(PreflightOptions):
     kinematics: Literal["AC", "BC", "AB"] = "AC"
     """Head with both rotary axes, the second letter carrying the first; `machine` names any other."""
     machine: str = ""
-    """Rotary axes: head-, mixed- or table- with ac, bc or ab; nutating-head-, nutating-mixed- or nutating-table-bc (45
-    degrees); or FILE.toml; empty: that of `kinematics`."""
+    """Rotary axes: head-ac, mixed-, table-, and bc or ab; nutating-head-bc, -mixed-, -table-; FILE.toml; or empty."""
     units: Literal["mm", "inch"] = "mm"
     """Unit of positions, and of feeds per minute."""
     tcp_on: str = ""
