@@ -22,8 +22,8 @@ COMMANDS = {
 """Function and one-line description of each command."""
 
 _EPILOGUE = (
-    "Exit codes: 0 done; 1 a bug; 2 usage or job; 3 an input; 4 registration; 5 a gate of the path, or a program that must "
-    "not run; 6 output refused; 7 warnings under --strict; 8 the program is written but a report failed; 130, 143 "
+    "Exit codes: 0 done; 1 a bug; 2 usage or job; 3 an input; 4 registration; 5 a gate of the path, or a program that "
+    "must not run; 6 output refused; 7 warnings under --strict; 8 the program is written but a report failed; 130, 143 "
     "interrupted."
 )
 _SETTINGS = (
