@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -13,7 +11,6 @@ from typing import Any
 from sicp_cam import plugins
 from sicp_cam.errors import InputError, JobError, printable
 from sicp_cam.findings import Finding, Level
-from sicp_cam.job.input_files import absent
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_cam.options.values import nearest, table
@@ -23,6 +20,7 @@ from sicp_cam.path_review import ReviewLimits, review
 from sicp_cam.plugins.checkers import check_program, checker, options_taken
 from sicp_cam.result_document import SCHEMA, findings_list, input_entry, versions
 from sicp_cam.result_document import status as worst_of
+from sicp_cam.written_programs import WrittenProgram, programs_in
 
 __all__ = ["Check", "check", "programs_of"]
 
@@ -33,11 +31,6 @@ NOT_JUDGED, UNREADABLE = 899, 903
 
 _FRAME_STATED = 317
 """Warns whoever corrects a path; that a written program says in which frame its points stand is as it should be."""
-
-_MANIFEST = "result.json"
-_PART = re.compile(r"(.+?)_?[0-9]{3,}", re.ASCII)
-"""Name of a program that another one calls, which bears the rest of the name: a part of a long path."""
-_MANIFEST_BYTES = 2**26
 
 
 def _none() -> Options:
@@ -51,7 +44,7 @@ class Check:
     Parameters
     ----------
     targets
-        Programs, or folders of programs, see `programs_of`.
+        Programs, or folders of programs, see `programs_in`.
     units
         Unit of programs that state none.
     against
@@ -80,12 +73,13 @@ class Check:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Judged:
-    """One program: what was read, None if it could not be, and what is to be told."""
+    """One program: what was read, None if it could not be, what is to be told, and why nobody tried to read it."""
 
     file: Path
     path: ToolPath | None
     findings: tuple[Finding, ...]
     comparison: Comparison | None = None
+    unread: str = ""
 
 
 def check(job: Check) -> dict[str, Any]:
@@ -104,10 +98,10 @@ def check(job: Check) -> dict[str, Any]:
     InputError
         If `against` cannot be read.
     """
-    files = [file for target in job.targets for file in programs_of(target)]
+    programs = [program for target in job.targets for program in programs_in(target)]
     limits, rest = _review_limits(job.check_options)
-    shared = _Shared(job, limits, _divided(files, job, rest), _reference(job))
-    judged = [_judged(file, shared) for file in files if job.against is None or not _same(file, job.against)]
+    shared = _Shared(job, limits, _divided([each.file for each in programs], job, rest), _reference(job))
+    judged = [_judged(each, shared) for each in programs if job.against is None or not _same(each.file, job.against)]
     if not judged:
         raise JobError(f"--against {printable(str(job.against))}: that is the only program; name another one to check")
     findings = [finding for each in judged for finding in each.findings]
@@ -127,62 +121,8 @@ def check(job: Check) -> dict[str, Any]:
 
 
 def programs_of(target: Path) -> tuple[Path, ...]:
-    """Return the programs that a file or folder holds, in order of name.
-
-    A folder is a VAL3 application if a .pjx file lies in it, or holds results if it has a result.json; of other
-    folders nobody knows which files are meant.
-
-    Raises
-    ------
-    InputError
-        If it does not exist, or is another folder.
-    """
-    name = printable(str(target))
-    if not target.is_dir():
-        if not target.exists():
-            raise InputError(f"{name}: {absent(target)}")
-        return (target,)
-    applications = sorted(file for file in target.iterdir() if file.suffix.lower() == ".pjx" and file.is_file())
-    if applications:
-        return tuple(applications)
-    if (target / _MANIFEST).is_file():
-        return _written(target)
-    raise InputError(f"{name}: a folder with neither a .pjx nor a {_MANIFEST}; name the programs in it")
-
-
-def _written(folder: Path) -> tuple[Path, ...]:
-    """Return the programs that the result of a run names and that a reader knows; of a VAL3 application its .pjx."""
-    manifest = folder / _MANIFEST
-    name = printable(str(manifest))
-    try:
-        if manifest.stat().st_size > _MANIFEST_BYTES:
-            raise InputError(f"{name}: larger than {_MANIFEST_BYTES} bytes, so it is no result of a run")
-        outputs = json.loads(manifest.read_text(encoding="utf-8"))["outputs"]
-        names = [str(entry["path"]) for entry in outputs if entry["kind"] == "program"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise InputError(f"{name}: is no result of a run; name the programs in the folder") from error
-    files = [folder / name for name in names if _is_below(name)]
-    of_project = {file.parent for file in files if plugins.suffix_of(file) == "pjx"}
-    found = [file for file in files if "path" in plugins.roles(file) and _begins(file, of_project, files)]
-    if not found:
-        raise InputError(f"{name}: names no program that can be read; name the programs in the folder")
-    return tuple(sorted(found))
-
-
-def _is_below(name: str) -> bool:
-    path = Path(name)
-    return not path.is_absolute() and ".." not in path.parts
-
-
-def _begins(file: Path, of_project: set[Path], files: list[Path]) -> bool:
-    """Say whether a file is the one to read a program by: a .pjx or .pgf that lists others, or no part of another."""
-    if plugins.suffix_of(file) in ("pjx", "pgf"):
-        return True
-    part = _PART.fullmatch(file.stem)
-    whole = {file.with_suffix(".pgf")} if plugins.suffix_of(file) in ("mod", "modx") else set()
-    if part is not None:
-        whole |= {file.with_name(part[1] + file.suffix), file.with_name(part[1] + ".pgf")}
-    return not (any(folder in of_project for folder in file.parents) or whole & set(files))
+    """Return the files by which the programs of a file or folder are read, see `programs_in`."""
+    return tuple(program.file for program in programs_in(target))
 
 
 # --- options ---
@@ -255,13 +195,19 @@ def _same(file: Path, other: Path) -> bool:
 # --- one program ---
 
 
-def _judged(file: Path, shared: _Shared) -> _Judged:
-    job = shared.job
+def _judged(program: WrittenProgram, shared: _Shared) -> _Judged:
+    job, file = shared.job, program.file
     reading, judging = shared.options[file]
+    unread = program.unread if not reading else ""
     findings: list[Finding] = []
     try:
         findings += _text_findings(file, job, judging)
-        path = plugins.read_path(file, units=job.units, limits=job.limits, options=reading)
+        if unread:
+            what = f"no path was read, so none was judged: {unread}"
+            findings.append(Finding(NOT_JUDGED, Level.INFO, what, printable(str(file))))
+            return _Judged(file, None, tuple(findings), unread=unread)
+        options = {**program.reading, **reading}
+        path = plugins.read_path(file, units=job.units, limits=job.limits, options=options)
     except InputError as error:
         findings.append(Finding(UNREADABLE, Level.FAIL, str(error)))
         return _Judged(file, None, tuple(findings))
@@ -281,7 +227,7 @@ def _text_findings(file: Path, job: Check, options: Options) -> Iterator[Finding
     if function is not None:
         yield from check_program(function, file, limits=job.limits, options=options)
         return
-    what = "no checker knows the words of this format; only the path in it was judged"
+    what = "no checker knows the words of this format; they were not judged"
     yield Finding(NOT_JUDGED, Level.INFO, what, printable(str(file)))
 
 
@@ -290,6 +236,7 @@ def _entry(judged: _Judged) -> dict[str, Any]:
         "path": str(judged.file),
         "status": worst_of(judged.findings, ()),
         "facts": None if judged.path is None else path_facts(judged.path),
+        "unread": judged.unread or None,
         "against": None if judged.comparison is None else judged.comparison.facts,
         "findings": findings_list(judged.findings),
     }
@@ -297,7 +244,7 @@ def _entry(judged: _Judged) -> dict[str, Any]:
 
 def _exit_code(judged: list[_Judged], *, strict: bool) -> int:
     levels = {finding.level for each in judged for finding in each.findings}
-    if any(each.path is None for each in judged):
+    if any(each.path is None and not each.unread for each in judged):
         return InputError.exit_code
     if Level.FAIL in levels:
         return 5

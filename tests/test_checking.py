@@ -188,3 +188,48 @@ def test_parts_of_a_long_program_are_checked_with_the_program_that_calls_them(tm
     outputs = [{"kind": "program", "path": name} for name in names]
     (tmp_path / "result.json").write_text(json.dumps({"outputs": outputs}))
     assert [each.name for each in programs_of(tmp_path)] == ["X.ls", "door.pgf", "door.src", "op_100.apt", "trim.src"]
+
+
+# --- what a run says of its programs ---
+
+
+@pytest.fixture
+def run_of(tmp_path):
+    """Write programs of the golden cases into a folder, with a result that says how each is read."""
+
+    def write(**readings):
+        outputs = []
+        for case, reading in readings.items():
+            (source,) = (GOLDEN / case.replace("_", "-")).iterdir()
+            name = f"{case}{source.suffix}"
+            (tmp_path / name).write_bytes(source.read_bytes())
+            outputs.append({"kind": "program", "path": name, **({} if reading is None else {"reading": reading})})
+        (tmp_path / "result.json").write_text(json.dumps({"outputs": outputs}), encoding="utf-8")
+        return tmp_path
+
+    return write
+
+
+def test_the_result_of_a_run_says_how_its_programs_are_read(run_of):
+    folder = run_of(gcode_rotary_ac={"rotary": "AC"}, csv={}, gcode_vector=None)
+    document = check(Check((folder,), against=folder / "csv.csv"))
+    assert document["exit_code"] == 0
+    assert [Path(each["path"]).name for each in document["programs"]] == ["gcode_rotary_ac.nc"]
+    assert check(Check((folder / "gcode_rotary_ac.nc",)))["exit_code"] == 0
+    wrong = check(Check((folder / "gcode_rotary_ac.nc",), path_options={"rotary": "BC"}))
+    assert wrong["exit_code"] == 3  # the user knows better, and is wrong
+    (folder / "result.json").write_text("[]", encoding="utf-8")
+    assert check(Check((folder / "gcode_rotary_ac.nc",)))["exit_code"] == 3
+
+
+def test_a_program_that_no_reader_can_follow_is_judged_by_its_text(run_of):
+    folder = run_of(gcode_rotary_ac="the angles mean nothing without the machine")
+    document = check(Check((folder,)))
+    (program,) = document["programs"]
+    assert (document["exit_code"], document["status"], program["facts"]) == (0, "ok", None)
+    assert program["unread"] == "the angles mean nothing without the machine"
+    assert [(f["code"], f["level"]) for f in document["findings"]] == [(899, "info")]
+    file = folder / "gcode_rotary_ac.nc"
+    file.write_bytes(file.read_bytes().replace(b"F2000", b"F0"))
+    assert check(Check((folder,)))["exit_code"] == 5
+    assert check(Check((folder,), path_options={"rotary": "AC"}))["exit_code"] == 3

@@ -113,7 +113,7 @@ def _tell(document: dict[str, Any]) -> None:
     for program in document["programs"]:
         name = printable(program["path"])
         levels = [finding["level"] for finding in program["findings"]]
-        if program["facts"] is None:
+        if program["facts"] is None and not program["unread"]:
             _log.error("%s", next(each["message"] for each in program["findings"] if each["code"] == 903))
         elif "fail" in levels:
             _log.error("%s: must not run: %s of level fail", name, counted(levels.count("fail"), "finding"))

@@ -22,7 +22,8 @@ def check_lines(document: Mapping[str, Any]) -> Iterator[str]:
     units = {entry["path"]: entry for entry in document["inputs"]}
     for program in document["programs"]:
         name = printable(program["path"])
-        yield f"{name}: {_what(program['facts'], units.get(program['path']))}"
+        unread = f"not read, {program['unread']}" if program["unread"] else "cannot be read"
+        yield f"{name}: {_what(program['facts'], units.get(program['path'])) or printable(unread)}"
         if program["against"] is not None:
             yield f"against {_against(program['against'])}"
         findings = program["findings"]
@@ -40,8 +41,9 @@ def counted(count: int, noun: str) -> str:
 
 
 def _what(facts: Mapping[str, Any] | None, source: Mapping[str, Any] | None) -> str:
+    """Say what a program is; nothing where it was not read."""
     if facts is None or source is None:
-        return "cannot be read"
+        return ""
     feeds = facts["feeds_mm_min"]
     more = facts["different_feeds"] - len(feeds)
     words = [

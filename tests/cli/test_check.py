@@ -109,3 +109,16 @@ def test_words_of_a_program_are_made_safe(run, files):
     Path("a.apt").write_text("PARTNO/x\x1b]0;y\nUNITS/MM\nFEDRAT/5\nGOTO/0,0,0\nGOTO/9,0,0\nODD\x1b/1\nFINI\n")
     code, out, _ = run("check", "a.apt")
     assert code == 0 and "\x1b" not in out and "ODD\\x1b" in out
+
+
+def test_a_program_that_nobody_reads_is_told_so(run, files):
+    Path("a.nc").write_bytes(NC.read_bytes())
+    outputs = [{"kind": "program", "path": "a.nc", "reading": "only its machine\x1b knows"}]
+    Path("result.json").write_text(json.dumps({"outputs": outputs}))
+    code, out, err = run("check", "a.nc")
+    assert (code, err) == (0, "")
+    assert out.splitlines() == [
+        "a.nc: not read, only its machine\\x1b knows",
+        "findings: 1",
+        "  info 899: a.nc: no path was read, so none was judged: only its machine\\x1b knows",
+    ]
