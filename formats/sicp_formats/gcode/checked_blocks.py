@@ -1,4 +1,4 @@
-"""Check the blocks of a G-code program one after the other: modes, feeds, tip control, rotary steps, numbers."""
+"""Check the blocks of a G-code program one after the other: modes, feeds, words, block numbers."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import re
 from collections import Counter
 
 from sicp_formats.gcode.checked_arcs import CheckedArcs
+from sicp_formats.gcode.checked_axis import CheckedAxis
 from sicp_formats.gcode.codes import HOMING, MOTION, UNITS, heidenhain_text, refuse_codes
-from sicp_formats.gcode.keywords import TIP_CONTROL_OFF, TIP_CONTROL_ON
 from sicp_formats.gcode.machine import END_CODES
 from sicp_formats.gcode.plain import PLAIN
 from sicp_formats.gcode.words import Block, GCodeError, split_block
@@ -15,12 +15,9 @@ from sicp_formats.paths.defects import Defects
 
 __all__ = ["CheckedBlocks"]
 
-END, MODES, NUMBERS, WORDS, FEED, TIP_CONTROL, ROTARY = range(871, 878)
-"""Codes of the findings."""
+END, MODES, NUMBERS, WORDS, FEED = range(871, 876)
+"""Codes of the findings; those of arcs and of the tool axis stand with them."""
 
-_ON = frozenset({43.4, 43.5, 234.0, 169.0})
-_OFF = frozenset({49.0, 170.0})
-_ON_M, _OFF_M = frozenset({128.0, 428.0}), frozenset({129.0, 429.0, 430.0})
 _GROUPS = tuple(
     map(
         frozenset,
@@ -66,7 +63,7 @@ class CheckedBlocks:
     def __init__(self, defects: Defects, decimal: str, rotary_step_deg: float) -> None:
         self._defects = defects
         self._decimal = decimal
-        self._largest_step = rotary_step_deg
+        self._axis = CheckedAxis(defects, rotary_step_deg)
         self._arcs = CheckedArcs(defects)
         self._heidenhain = False
         self._stated: set[str] = set()
@@ -76,11 +73,6 @@ class CheckedBlocks:
         self._inverse_time = False
         self._feed_known = False
         self._number = -1
-        self._angles: dict[str, float] = {}
-        self._tip_control = self._vector_words = False
-        self._was_on = False
-        self._vector_before = 0
-        self._turned_before = 0
         self._ended = False
 
     def take(self, line: str, number: int) -> bool:
@@ -111,9 +103,7 @@ class CheckedBlocks:
         """Judge what only the whole program shows."""
         if not self._ended:
             self._defects.warn(END, "the program has no end (M2 or M30); is the file complete?", last)
-        if self._vector_before and not self._was_on:
-            what = "the tool axis is stated as a vector, and no word switches tip control on (G43.5, TRAORI)"
-            self._defects.fail(TIP_CONTROL, what, self._vector_before)
+        self._axis.finish()
 
     # --- blocks ---
 
@@ -138,12 +128,12 @@ class CheckedBlocks:
             self._arcs.block({"X": x, "Y": y, "Z": z, "I": i, "J": j, "K": k}, self._mode, self._absolute, line)
         else:
             self._arcs.straight(x, y, z, self._absolute)
-            if points and not self._vector_allowed(i3 is not None or j3 is not None or k3 is not None):
-                self._points_without_control(line)
+            if points:
+                self._axis.point(i3 is not None or j3 is not None or k3 is not None, line)
         if self._mode:
             self._cut(f is not None, line)
         if turns:
-            self._turn({"A": a, "B": b, "C": c}, line)
+            self._axis.turn({"A": a, "B": b, "C": c}, absolute=self._absolute, cuts=bool(self._mode), line=line)
 
     def _block(self, block: Block, line: int) -> bool:
         if number := block.words.get("N"):
@@ -156,14 +146,12 @@ class CheckedBlocks:
         dwells = 4.0 in block.g
         if "F" in block.words and not dwells:
             self._take_feed(block.words["F"], line)
-        if 6.0 in block.m and self._tip_control:
-            self._defects.warn(TIP_CONTROL, "the tool is changed while tip control is on; switch it off before", line)
         moving = any(letter in block.words for letter in _MOVING) or (
             (self._mode or 0.0) >= 2.0 and any(letter in block.words for letter in "IJK")
         )
         if homing or any(code in (10.0, 52.0, 92.0) for code in block.g) or block.manners:
             self._arcs.forget()
-            self._angles.clear()
+            self._axis.forget()
         elif moving and not dwells:
             self._move(block, line)
         return self._end(block, line)
@@ -177,21 +165,21 @@ class CheckedBlocks:
         self._arcs.block(words, self._mode or 0.0, self._absolute, line)
         if (self._mode or 0.0) < 2.0:
             siemens = any(letter in words for letter in ("A3", "B3", "C3"))
-            if (siemens or any(letter in words for letter in "IJK")) and not self._vector_allowed(siemens):
-                self._points_without_control(line)
+            if siemens or any(letter in words for letter in "IJK"):
+                self._axis.point(siemens, line)
         elif "plane" not in self._stated:
             self._stated.add("plane")
             self._defects.warn(MODES, "an arc before its plane is stated (G17, G18 or G19)", line)
         if self._mode:
             self._cut("F" in words, line)
-        self._turn({letter: words.get(letter) for letter in "ABC"}, line)
+        angles = {letter: words.get(letter) for letter in "ABC"}
+        self._axis.turn(angles, absolute=self._absolute, cuts=bool(self._mode), line=line)
 
     def _end(self, block: Block, line: int) -> bool:
         if not any(code in END_CODES for code in block.m):
             return False
         self._ended = True
-        if self._tip_control:
-            self._defects.warn(TIP_CONTROL, "the program ends while tip control is on; switch it off before", line)
+        self._axis.end(line)
         return True
 
     # --- modes ---
@@ -214,34 +202,7 @@ class CheckedBlocks:
             elif code in (93.0, 94.0, 95.0):
                 self._feed_known = self._feed_known and (code == 93.0) == self._inverse_time
                 self._inverse_time = code == 93.0
-            if code in _ON or code in _OFF:
-                self._switch(code in _ON, vector=code == 43.5)
-        for code in block.m:
-            if code in _ON_M or code in _OFF_M:
-                self._switch(code in _ON_M, vector=False)
-        for keyword in block.keywords:
-            if keyword.startswith(TIP_CONTROL_ON):
-                self._switch(True, vector=False)
-            elif keyword == TIP_CONTROL_OFF:
-                self._switch(False, vector=False)
-
-    def _switch(self, on: bool, *, vector: bool) -> None:
-        first = min(filter(None, (self._vector_before, self._turned_before)), default=0)
-        if on and first and not self._was_on:
-            self._defects.fail(TIP_CONTROL, "the tool axis turns before tip control is switched on", first)
-        self._tip_control, self._vector_words = on, vector
-        self._was_on = self._was_on or on
-
-    def _vector_allowed(self, siemens: bool) -> bool:
-        return self._tip_control if siemens else self._vector_words
-
-    def _points_without_control(self, line: int) -> None:
-        if self._was_on and not self._tip_control:
-            self._defects.fail(TIP_CONTROL, "the tool axis is stated after tip control is switched off", line)
-        elif self._was_on:
-            self._defects.fail(TIP_CONTROL, "I J K in a straight move, while G43.5 is not on", line)
-        else:
-            self._vector_before = self._vector_before or line
+        self._axis.take_modes(block, line)
 
     def _first_move(self, line: int) -> None:
         self._moved = True
@@ -289,22 +250,3 @@ class CheckedBlocks:
         elif not self._feed_known:
             self._feed_known = True
             self._defects.fail(FEED, "the first cut comes before a feed (F) is stated", line)
-
-    def _turn(self, words: dict[str, str | None], line: int) -> None:
-        """Check rotary words: the step from the block before, and cuts that turn while tip control is off."""
-        for letter, text in words.items():
-            if text is None:
-                continue
-            angle, before = float(text), self._angles.get(letter)
-            if not self._absolute:
-                angle, before = (before or 0.0) + angle, before or 0.0
-            self._angles[letter] = angle
-            step = 0.0 if before is None else abs(angle - before)
-            if step > self._largest_step:
-                what = f"{letter} turns by {step:.6g} degrees in one block, from {before:.6g} to {angle:.6g}"
-                self._defects.warn(ROTARY, what, line)
-            if not step or not self._mode or self._tip_control:
-                continue
-            if self._was_on:
-                self._defects.fail(TIP_CONTROL, f"{letter} turns in a cut after tip control is switched off", line)
-            self._turned_before = self._turned_before or line
