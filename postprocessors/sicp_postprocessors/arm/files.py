@@ -24,18 +24,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 from sicp_cam.errors import JobError, printable
 from sicp_postprocessors.arm.model import Arm, Joint
+from sicp_postprocessors.data_files import read_toml, toml_from_text
 
 __all__ = ["arm_from_text", "arm_names", "load_arm"]
 
-_LARGEST_FILE = 65_536
 _LONGEST_MM = 100_000.0
 _WORLDS = ("shoulder", "base_plate")
 _LENGTHS = {
@@ -81,18 +79,7 @@ def load_arm(robot: str) -> Arm:
             )
         content = (resources.files("sicp_postprocessors.arm") / "robots" / f"{name}.toml").read_bytes()
         return arm_from_text(content.decode("utf-8"), f"{name}.toml")
-    try:
-        with Path(robot).open("rb") as file:
-            content = file.read(_LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "its name is not valid"
-        raise JobError(f"robot file {printable(robot)} cannot be read: {reason}") from None
-    if len(content) > _LARGEST_FILE:
-        raise JobError(f"robot file {printable(robot)} has more than {_LARGEST_FILE} bytes; it is no kinematics file")
-    try:
-        return arm_from_text(content.decode("utf-8-sig"), robot)
-    except UnicodeDecodeError as error:
-        raise JobError(f"robot file {printable(robot)}, byte {error.start}: it is not UTF-8 text") from None
+    return _arm_from_table(read_toml(robot, "robot"), robot)
 
 
 def arm_from_text(text: str, file: str) -> Arm:
@@ -107,12 +94,10 @@ def arm_from_text(text: str, file: str) -> Arm:
     Traceback (most recent call last):
     sicp_cam.errors.JobError: robot file my.toml: world must be shoulder or base_plate; ...
     """
-    try:
-        table = tomllib.loads(text)
-    except RecursionError:
-        raise JobError(f"robot file {printable(file)}: its values are nested too deeply") from None
-    except ValueError as error:  # TOMLDecodeError, or a whole number of thousands of digits
-        raise JobError(f"robot file {printable(file)}: {printable(str(error))}") from None
+    return _arm_from_table(toml_from_text(text, file, "robot"), file)
+
+
+def _arm_from_table(table: Mapping[str, Any], file: str) -> Arm:
     problems: list[str] = []
     _unknown_keys(table, ("name", "world", "remark", "geometry_mm", "joint", "sources"), "", problems)
     name, world, remark = table.get("name", ""), table.get("world", ""), table.get("remark", "")

@@ -32,15 +32,14 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 from sicp_cam.errors import JobError, printable
+from sicp_postprocessors.data_files import read_toml, toml_from_text
 from sicp_postprocessors.gcode.machine import NO_LIMITS_DEG, WRAPS, Machine, RotaryAxis, Vector
 
 __all__ = ["load_machine", "machine_from_text", "machine_names"]
 
-_LARGEST_FILE = 65_536
 _LARGEST = 1e6
 _KEYS = ("name", "home_axis", "rotary", "linear_limits_mm", "sources")
 _ROTARY_KEYS = ("letter", "on", "direction", "sense", "point_mm", "pivot_mm", "limits_deg", "wrap")
@@ -68,17 +67,7 @@ def load_machine(machine: str) -> Machine:
             known = ", ".join(machine_names())
             raise JobError(f"machine {printable(machine, 60)!r} is not known; known are {known}, or a file NAME.toml")
         return _built(_presets()[machine.lower()], machine)
-    try:
-        content = Path(machine).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "its name is not valid"
-        raise JobError(f"machine file {printable(machine)} cannot be read: {reason}") from None
-    if len(content) > _LARGEST_FILE:
-        raise JobError(f"machine file {printable(machine)} has {len(content)} bytes; such a file has a few hundred")
-    try:
-        return machine_from_text(content.decode("utf-8-sig"), machine)
-    except UnicodeDecodeError as error:
-        raise JobError(f"machine file {printable(machine)}, byte {error.start}: it is not UTF-8 text") from None
+    return _built(read_toml(machine, "machine"), machine)
 
 
 def machine_from_text(text: str, file: str) -> Machine:
@@ -93,11 +82,7 @@ def machine_from_text(text: str, file: str) -> Machine:
     Traceback (most recent call last):
     sicp_cam.errors.JobError: machine file my.toml: rotary must be two tables [[rotary]]
     """
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise JobError(f"machine file {printable(file)}: {printable(str(error))}") from None
-    return _built(table, file)
+    return _built(toml_from_text(text, file, "machine"), file)
 
 
 @cache
