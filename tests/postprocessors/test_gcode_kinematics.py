@@ -307,5 +307,5 @@ class TestMachineFiles:
         with pytest.raises(JobError, match="byte 8: it is not UTF-8"):
             load_machine(str(wrong))
         wrong.write_bytes(b"#" * 70_000)
-        with pytest.raises(JobError, match="has 70000 bytes"):
+        with pytest.raises(JobError, match="has more than 65536 bytes"):
             load_machine(str(wrong))
