@@ -104,13 +104,19 @@ def broken(plugins: tuple[Plugin, ...]) -> tuple[Finding, ...]:
 def owners(group: str) -> dict[str, list[Plugin]]:
     """Return the claims on each name of a group, those of its override group behind the others; imports none."""
     claims: dict[str, list[Plugin]] = {}
+    told: dict[int, str] = {}
     registered = entry_points()
     for override in (False, True):
         for entry in registered.select(group=f"{group}.override" if override else group):
-            dist = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown distribution"
+            dist = told.get(id(entry.dist)) or _owner_of(entry)
+            told[id(entry.dist)] = dist  # looking it up parses the metadata of the distribution
             name = entry.name if group == POSTPROCESSORS else entry.name.lower()
             claims.setdefault(name, []).append(Plugin(group, name, entry.value, dist, override))
     return claims
+
+
+def _owner_of(entry: EntryPoint) -> str:
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown distribution"
 
 
 def owner(claims: list[Plugin]) -> Plugin:
