@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from sicp_cam import output, plugins
+from sicp_cam.checking.reading_back import read_back
 from sicp_cam.correction import unit_taken
 from sicp_cam.errors import JobError, OutputError, SicpError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import FloatArray, IntArray, Part, Program, Scan, Source, Status, ToolPath
-from sicp_cam.reading_back import read_back
 from sicp_cam.result_document import SCHEMA, findings_list, input_entry, output_entry, status, versions
 from sicp_cam.roles import role_of
 from sicp_cam.units import mm_per_unit

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sicp_cam import output, plugins
+from sicp_cam.checking.facts import bounds, feed_facts, rounded
 from sicp_cam.contour.loops import mesh_loops, resampled, rim_loops
 from sicp_cam.correction import contours_of, unit_taken
 from sicp_cam.errors import InputError, printable
 from sicp_cam.job.input_files import is_pose
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import Contour, FloatArray, Source, ToolPath
-from sicp_cam.path_facts import bounds, feed_facts, rounded
 from sicp_cam.registration.scan_surface import ScanSurface, prepared
 from sicp_cam.result_document import findings_list, input_entry
 

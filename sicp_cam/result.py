@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from sicp_cam import output, plugins
+from sicp_cam.checking.reading_back import read_back
 from sicp_cam.correction import PartRegistration, contours_of
 from sicp_cam.errors import ReportError
 from sicp_cam.findings import Finding, Level
 from sicp_cam.job import Job
 from sicp_cam.model import FloatArray, Part, Program, Scan, ToolPath
-from sicp_cam.reading_back import read_back
 from sicp_cam.report.statistics import uncertainty_summary
 from sicp_cam.result_document import (
     SCHEMA,

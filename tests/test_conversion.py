@@ -107,7 +107,7 @@ def test_what_a_program_reads_back_as_is_compared(tmp_path, monkeypatch):
     made = plugins.postprocessor("csv").write
     post = plugins.postprocessor("csv")
     monkeypatch.setattr(type(post), "write", lambda self, program, noticed: {"b.csv": _shifted(made(program)["b.csv"])})
-    with pytest.raises(OutputError, match="reads back as something else .*off by more than 0.002 mm, this one by 1 "):
+    with pytest.raises(OutputError, match=r"reads back as something else .*off by more than 0\.002 mm, this one by 1 "):
         converted(source, "b.csv")
     assert not (tmp_path / "b.csv").exists()
 

@@ -323,7 +323,10 @@ def test_python_values_make_a_layer_too(folder):
     ("stated", "told"),
     [
         ({"post": "VAL3"}, "post: no postprocessor 'VAL3'; did you mean val3?"),
-        ({"post": "csv,fanuc"}, "post: no postprocessor 'fanuc'; known: apt, csv, dxf, gcode, krl, ls, rapid, robodk, same, ur, val3"),
+        (
+            {"post": "csv,fanuc"},
+            "post: no postprocessor 'fanuc'; known: apt, csv, dxf, gcode, krl, ls, rapid, robodk, same, ur, val3",
+        ),
         ({"method": "rigd"}, "method: no method 'rigd'; did you mean rigid?"),
         ({"report": "pfd"}, "report: must be one of pdf, png, not 'pfd' (did you mean pdf?); or none for no report"),
         ({"frame": "Part"}, "frame: must be one of scan, part, not 'Part' (did you mean part?)"),

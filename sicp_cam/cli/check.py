@@ -82,10 +82,11 @@ def _run(
         raise JobError("--tolerance-mm and --tolerance-deg must be numbers of at least 0")
     limits, tables = reader_settings(pairs, ("path", "check", "against"))
 
-    from sicp_cam import checking
+    from sicp_cam.checking.check import Check
+    from sicp_cam.checking.check import check as judged
 
-    document = checking.check(
-        checking.Check(
+    document = judged(
+        Check(
             programs,
             units,
             against,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sicp_cam.alignment import read_alignment
-from sicp_cam.checking import Check, check
+from sicp_cam.checking.check import Check, check
 from sicp_cam.rigid_motion import apply, from_parts, inverse, rotate
 
 POSTS = ["val3", "gcode", "apt", "krl", "rapid", "ls", "ur"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from sicp_cam import plugins
-from sicp_cam.checking import Check, check, programs_of
+from sicp_cam.checking.check import Check, check, programs_of
 from sicp_postprocessors.robodk_csv import RoboDkCsv
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "posts"

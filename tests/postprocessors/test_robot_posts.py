@@ -10,10 +10,10 @@ from post_reread import axis_error_deg
 from post_reread_robots import pose, read_krl, read_ls, read_rapid, read_robodk, read_ur
 from scipy.spatial.transform import Rotation
 
+from sicp_cam.checking.reading_back import read_back
 from sicp_cam.errors import JobError, PathError
 from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind
-from sicp_cam.reading_back import read_back
 from sicp_cam.rigid_motion import exponential
 from sicp_postprocessors.fanuc_ls import FanucLs
 from sicp_postprocessors.krl import Krl

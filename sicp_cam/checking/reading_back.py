@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from sicp_cam import plugins
+from sicp_cam.checking.comparison import compared
 from sicp_cam.errors import InputError, JobError, OutputError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import Program, ToolPath
-from sicp_cam.path_comparison import compared
 
 __all__ = ["ReadBack", "read_back"]
 

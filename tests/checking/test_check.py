@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from sicp_cam.checking import Check, check, programs_of
+from sicp_cam.checking.check import Check, check, programs_of
 from sicp_cam.errors import InputError, JobError
 from sicp_cam.limits import Limits
 from sicp_cam.plugins import registry
 
-GOLDEN = Path(__file__).parent / "golden" / "posts"
+GOLDEN = Path(__file__).parents[1] / "golden" / "posts"
 NC = GOLDEN / "gcode-vector" / "porthole.nc"
 CSV = GOLDEN / "csv" / "porthole.csv"
 ROTARY = GOLDEN / "gcode-rotary-ac" / "porthole.nc"
@@ -129,7 +129,7 @@ def test_the_reference_itself_is_not_checked():
 
 
 def test_a_program_whose_words_nobody_knows_is_judged_by_its_path():
-    nci = Path(__file__).parent / "corpus" / "nci"
+    nci = Path(__file__).parents[1] / "corpus" / "nci"
     document = check(Check((next(iter(sorted(nci.glob("*.nci")))),)))
     assert 899 in {f["code"] for f in document["findings"]}
 
@@ -160,7 +160,7 @@ def check(path, *, limits, most: int = 0):
 
 def test_a_third_party_can_judge_a_suffix(third_party):
     third_party("]\nnci = odd_checker:check", FINDS)
-    nci = next(iter(sorted((Path(__file__).parent / "corpus" / "nci").glob("*.nci"))))
+    nci = next(iter(sorted((Path(__file__).parents[1] / "corpus" / "nci").glob("*.nci"))))
     document = check(Check((nci,), check_options={"most": 7}))
     assert document["exit_code"] == 5 and document["findings"][0]["message"] == "more than 7"
 

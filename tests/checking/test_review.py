@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from sicp_cam.checking.facts import path_facts
+from sicp_cam.checking.review import ReviewLimits, review
 from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind, ToolPath
-from sicp_cam.path_facts import path_facts
-from sicp_cam.path_review import ReviewLimits, review
 
 UP = [0.0, 0.0, 1.0]
 

@@ -9,18 +9,18 @@ from types import MappingProxyType
 from typing import Any
 
 from sicp_cam import plugins
+from sicp_cam.checking.comparison import Comparison, compared
+from sicp_cam.checking.facts import path_facts
+from sicp_cam.checking.review import ReviewLimits, review
+from sicp_cam.checking.written_programs import WrittenProgram, programs_in
 from sicp_cam.errors import InputError, JobError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS, Limits
 from sicp_cam.model import ToolPath
 from sicp_cam.options.values import nearest, table
-from sicp_cam.path_comparison import Comparison, compared
-from sicp_cam.path_facts import path_facts
-from sicp_cam.path_review import ReviewLimits, review
 from sicp_cam.plugins.checkers import check_program, checker, options_taken
 from sicp_cam.result_document import SCHEMA, findings_list, input_entry, versions
 from sicp_cam.result_document import status as worst_of
-from sicp_cam.written_programs import WrittenProgram, programs_in
 
 __all__ = ["Check", "check", "programs_of"]
 

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sicp_cam.checking.reading_back import read_back
 from sicp_cam.errors import OutputError
-from sicp_cam.reading_back import read_back
 from sicp_postprocessors.apt import Apt
 from sicp_postprocessors.base import Postprocessor
 from sicp_postprocessors.dxf import Dxf
 from sicp_postprocessors.path_csv import PathCsv
 from sicp_postprocessors.val3 import Val3
 
-sys.path.insert(0, str(Path(__file__).parent / "postprocessors"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "postprocessors"))
 
 from post_programs import simple_program
 
@@ -46,9 +46,7 @@ def test_a_program_that_says_something_else_is_not_kept(old, new, words):
 def test_a_program_that_cannot_be_read_is_not_kept():
     program = simple_program()
     ((name, content),) = Apt().write(program).items()
-    with pytest.raises(
-        OutputError, match=r"cannot be read back \(porthole.apt, line [0-9]+: .*\); nothing was"
-    ):
+    with pytest.raises(OutputError, match=r"cannot be read back \(porthole.apt, line [0-9]+: .*\); nothing was"):
         read_back(Apt(), program, {name: content.replace(b"MULTAX/ON", b"GOTO/1,2")})
 
 

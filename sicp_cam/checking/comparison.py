@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from sicp_cam.checking.review import angles_deg, place
 from sicp_cam.errors import printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import FloatArray, IntArray, ToolPath
-from sicp_cam.path_review import angles_deg, place
 from sicp_cam.rigid_motion import apply, best_fit
 
 __all__ = ["Comparison", "compared"]

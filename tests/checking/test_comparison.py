@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from sicp_cam.checking.comparison import compared
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import ToolPath
-from sicp_cam.path_comparison import compared
 from sicp_cam.rigid_motion import apply, from_parts
 
 

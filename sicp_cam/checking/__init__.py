@@ -1,0 +1,1 @@
+"""Programs that are written: read back, judged, and compared with another one."""
