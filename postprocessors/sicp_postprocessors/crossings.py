@@ -17,6 +17,8 @@ __all__ = ["Crossing", "crossings"]
 
 _MOST_SAMPLES = 50_000
 _SHORTEST_STEP_MM = 0.2
+_MOST_PAIRS = 5_000_000
+"""Pairs of near samples beyond which the cuts fill space rather than follow a contour."""
 _MOST_CANDIDATES = 20_000
 _GAP_MM = 0.05
 """Distance at which two strands touch; passes at different depths lie further apart."""
@@ -68,8 +70,10 @@ class _Cuts:
         return np.where(to_begin[:, None], self.begin_mm[row], self.end_mm[row])
 
 
-def crossings(tips_mm: FloatArray, axes: FloatArray, rapid: BoolArray) -> list[Crossing]:
+def crossings(tips_mm: FloatArray, axes: FloatArray, rapid: BoolArray) -> list[Crossing] | None:
     """Return where cutting moves cross each other within 0.05 mm, in the order of the later move.
+
+    None where the cuts lie so close together, at the step that they are looked at, that looking would take too long.
 
     Not counted are: strands that run along each other or part at less than 10 degrees, such as a second pass and the
     overlap of a closed contour; ends of cuts on another cut; places where both strands have the end of a move, to which
@@ -93,6 +97,8 @@ def crossings(tips_mm: FloatArray, axes: FloatArray, rapid: BoolArray) -> list[C
     s = np.arange(0.0, total, step)
     row = np.clip(np.searchsorted(cuts.s_mm, s, side="right") - 1, 0, len(cuts.move) - 1)
     pairs = _near_pairs(cuts.on(row, s), s, cuts.cut[row], step)
+    if pairs is None:
+        return None
     if not len(pairs):
         return []
     i, j = pairs.T
@@ -114,9 +120,15 @@ def _cuts(tips_mm: FloatArray, rapid: BoolArray) -> _Cuts | None:
     return _Cuts(used + 1, tips_mm[used], tips_mm[used + 1], s, number[used])
 
 
-def _near_pairs(points: FloatArray, s: FloatArray, cut: IntArray, step: float) -> IntArray:
-    """Return pairs (k, 2) of samples that are near to each other, do not follow each other, and run across."""
-    pairs: IntArray = cKDTree(points, balanced_tree=False).query_pairs(step + _GAP_MM, output_type="ndarray")
+def _near_pairs(points: FloatArray, s: FloatArray, cut: IntArray, step: float) -> IntArray | None:
+    """Return pairs (k, 2) of samples that are near to each other, do not follow each other, and run across.
+
+    None if there are too many near ones.
+    """
+    tree, near_mm = cKDTree(points, balanced_tree=False), step + _GAP_MM
+    if tree.count_neighbors(tree, near_mm) > 2 * _MOST_PAIRS + len(points):
+        return None
+    pairs: IntArray = tree.query_pairs(near_mm, output_type="ndarray")
     i, j = pairs.T
     apart = (np.abs(s[i] - s[j]) > 3.0 * step) | (cut[i] != cut[j])
     pairs = pairs[apart]

@@ -213,6 +213,9 @@ def _goes_back(path: ToolPath, motion: _Motion) -> BoolArray:
 
 def _crossing_findings(path: ToolPath) -> list[Finding]:
     found = crossings(path.tips_mm, path.axes, path.rapid)
+    if found is None:
+        what = "the cuts lie so close together that places where they cross were not looked for"
+        return [Finding(669, Level.INFO, what)]
     findings = []
     for crossing in found[:_MOST_TOLD]:
         level = Level.WARN if crossing.same_cut else Level.INFO

@@ -118,3 +118,9 @@ def test_two_hundred_thousand_moves_are_checked_in_a_moment():
     begin = time.process_time()
     assert [f.code for f in path_findings(program, np.eye(4), PreflightOptions())] == [669]
     assert time.process_time() - begin < 1.5, "0.15 s were measured; a path must not be looked at move by move"
+
+
+def test_cuts_that_fill_space_are_not_looked_at_for_minutes():
+    rng = np.random.default_rng(0)
+    tips = rng.uniform(-500.0, 500.0, (10_000, 3))
+    assert crossings(tips, np.tile([0.0, 0.0, 1.0], (10_000, 1)), np.arange(10_000) == 0) is None

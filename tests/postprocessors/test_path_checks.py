@@ -161,3 +161,9 @@ def test_g_code_takes_the_checks_as_options_of_its_own():
         PathError, match=r"moves 16 to 19, lines 26 to 29: the tip leaves the work box by up to 4.000 mm"
     ):
         post.write(straight_program(20))
+
+
+def test_that_crossings_were_not_looked_for_is_told():
+    tips = np.random.default_rng(0).uniform(-500.0, 500.0, (10_000, 3))
+    findings = checked(program_of(path_of(tips, [[0, 0, 1]] * 10_000, 600.0)))
+    assert [f.level for f in findings if f.code == 669] == [Level.INFO]
