@@ -63,15 +63,15 @@ def _cell_findings(path: ToolPath, options: RobotOptions, post: str) -> list[Fin
     findings = []
     if not options.tool_is_known:
         message = (
-            "the tool is declared at the flange itself; give its tip in mm and degrees with "
-            f"{flag(post, 'tool', _SIX)}, or teach it on the controller"
+            "the tool is declared at the flange itself, and the program waits for the operator to teach it; give its "
+            f"tip in mm and degrees with {flag(post, 'tool', _SIX)}"
         )
         findings.append(Finding(630, Level.WARN, message))
     if not options.cell_is_known:
         world = "base plate" if getattr(options, "world_origin", "") == "base_plate" else "world"
         message = (
-            f"no cell is given, so the scan frame is taken as the robot's {world}; give its pose there in mm and "
-            f"degrees with {flag(post, 'cell', _SIX)}"
+            f"no cell is given, so the scan frame is taken as the robot's {world}, and the program waits for the "
+            f"operator; give its pose there in mm and degrees with {flag(post, 'cell', _SIX)}"
         )
         findings.append(Finding(631, Level.WARN, message))
     signals = {
