@@ -2,8 +2,8 @@
 
 Codes: 601 empty path, 602 feed not valid, 603 feed missing, 604 axis not of unit length, 605 coordinate too large,
 606 event not valid, 607 program frame not rigid, 608 column not valid, 609 name changed, 610 event not written,
-611 begins with a cutting move, 612 program frame is not the scan frame, 653 cut longer than a program. Posts of this
-package go on at 620 (G-code) and 630 (robots).
+611 begins with a cutting move, 612 program frame is not the scan frame, 613 cut with the spindle off, 653 cut longer
+than a program. Posts of this package go on at 620 (G-code) and 630 (robots).
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from sicp_cam.errors import printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS
-from sicp_cam.model import BoolArray, Event, EventKind, Program, ToolPath
+from sicp_cam.model import BoolArray, Event, EventKind, IntArray, Program, ToolPath
 from sicp_cam.rigid_motion import is_rigid
 from sicp_postprocessors.text import counted
 
@@ -32,6 +32,7 @@ __all__ = [
     "in_scan_frame",
     "move_place",
     "name_findings",
+    "spindle_findings",
     "stretch_findings",
 ]
 
@@ -117,6 +118,42 @@ def event_findings(events: Iterable[Event], kinds: set[EventKind], why: str) -> 
         )
         for (kind, text), left_out in lost.items()
     ]
+
+
+def spindle_findings(path: ToolPath, stops_spindle: Callable[[Event], bool]) -> list[Finding]:
+    """Refuse cuts with a spindle that ran and that a tool change has stopped.
+
+    Parameters
+    ----------
+    path
+        The path.
+    stops_spindle
+        Whether the machine stops the spindle at an event.
+    """
+    message = "cuts with the spindle off after a tool change; start the spindle in the path after the change"
+    return [Finding(613, Level.FAIL, message, event_place(event)) for event in _not_restarted(path, stops_spindle)]
+
+
+def _not_restarted(path: ToolPath, stops_spindle: Callable[[Event], bool]) -> list[Event]:
+    """Return the events that stop a running spindle which does not start again before the next cut."""
+    cuts = np.flatnonzero(~path.rapid)
+    stopped: list[Event] = []
+    runs, pending = False, None
+    for event in sorted(path.events, key=lambda event: event.before_move):
+        if pending and _cut_between(cuts, pending.before_move, event.before_move):
+            stopped.append(pending)
+            pending = None
+        if event.kind is EventKind.SPINDLE:
+            runs, pending = event.value != 0, None
+        elif runs and stops_spindle(event):
+            runs, pending = False, event
+    if pending and _cut_between(cuts, pending.before_move, len(path)):
+        stopped.append(pending)
+    return stopped
+
+
+def _cut_between(cuts: IntArray, first: int, stop: int) -> bool:
+    return bool(np.searchsorted(cuts, first) < np.searchsorted(cuts, stop))
 
 
 def name_findings(program: Program, written: str) -> list[Finding]:

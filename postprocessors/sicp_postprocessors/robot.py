@@ -22,7 +22,7 @@ from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.numbers import LARGEST, trimmed
 from sicp_postprocessors.options import flag
 from sicp_postprocessors.orientations import Six, angles_from_axes, pose_from_six, rotation_matrices
-from sicp_postprocessors.robot_findings import robot_findings
+from sicp_postprocessors.robot_findings import changes_tool_by_hand, robot_findings
 from sicp_postprocessors.robot_options import RobotOptions, output_words
 from sicp_postprocessors.template import LinePostprocessor
 from sicp_postprocessors.zones import passed_points, zones_mm
@@ -176,7 +176,7 @@ class RobotPostprocessor(LinePostprocessor):
         told: list[Event] = []
         runs = False
         for event in events_in_order(program.path):
-            by_hand = event.kind is EventKind.TOOL and event.before_move > 0
+            by_hand = changes_tool_by_hand(event)
             if by_hand and runs:
                 told.append(Event(event.before_move, EventKind.SPINDLE, 0.0, "", event.line))
                 runs = False
@@ -187,6 +187,10 @@ class RobotPostprocessor(LinePostprocessor):
             elif event.kind is EventKind.SPINDLE:
                 runs = event.value != 0.0
         return told
+
+    def stops_spindle(self, event: Event) -> bool:
+        """Say that a tool is changed by hand once the path has begun, and with the spindle off."""
+        return changes_tool_by_hand(event)
 
     def _told_by_hand(self, event: Event) -> Event:
         """Return a stop or comment in place of an event that no output switches, other events as they are."""

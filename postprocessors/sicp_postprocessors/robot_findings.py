@@ -1,8 +1,8 @@
 """What a robot's operator must know or set before a program runs.
 
 Codes: 630 tool not given, 631 cell not given, 632 output not linked, 633 spindle direction, 634 spindle speed not
-commanded, 635 flange turns further than the tool axis, 636 tool change by hand, 637 cutting with the spindle off,
-638 several tools, 639 stops between cutting moves, 640 angles that miss the tool axis.
+commanded, 635 flange turns further than the tool axis, 636 tool change by hand, 638 several tools, 639 stops between
+cutting moves, 640 angles that miss the tool axis.
 """
 
 from __future__ import annotations
@@ -100,8 +100,6 @@ def _spindle_findings(path: ToolPath, options: RobotOptions, post: str) -> list[
         words = f", or {flag(post, 'spindle_speed', 'aio')}" if hasattr(options, "spindle_speed") else ""
         message = f"the spindle speed is not commanded: set {speeds} rev/min at the drive{words}"
         findings.append(Finding(634, Level.INFO, message))
-    message = "cuts with the spindle off after a tool change; start the spindle in the path after the change"
-    findings += [Finding(637, Level.FAIL, message, event_place(e)) for e in _changes_without_restart(path)]
     return findings
 
 
@@ -148,25 +146,3 @@ def _stop_findings(path: ToolPath, zones_mm: FloatArray, options: RobotOptions, 
         words = flag(post, "first_run", "false")
         return [Finding(639, Level.INFO, f"{told}, as a first run does; production: {words}", where)]
     return [Finding(639, Level.WARN, f"{told}; let it run through with {flag(post, 'blend', 'true')}", where)]
-
-
-def _changes_without_restart(path: ToolPath) -> list[Event]:
-    """Return the tool changes that stop a running spindle which does not start again before the next cut."""
-    cuts = np.flatnonzero(~path.rapid)
-    stopped: list[Event] = []
-    runs, pending = False, None
-    for event in events_in_order(path):
-        if pending and _cut_between(cuts, pending.before_move, event.before_move):
-            stopped.append(pending)
-            pending = None
-        if event.kind is EventKind.SPINDLE:
-            runs, pending = event.value != 0, None
-        elif changes_tool_by_hand(event) and runs:
-            runs, pending = False, event
-    if pending and _cut_between(cuts, pending.before_move, len(path)):
-        stopped.append(pending)
-    return stopped
-
-
-def _cut_between(cuts: np.ndarray[tuple[int], np.dtype[np.int64]], first: int, stop: int) -> bool:
-    return bool(np.searchsorted(cuts, first) < np.searchsorted(cuts, stop))

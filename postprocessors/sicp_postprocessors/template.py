@@ -14,7 +14,7 @@ from sicp_cam.errors import OutputError, printable
 from sicp_cam.findings import Finding, Level
 from sicp_cam.model import BoolArray, Event, EventKind, FloatArray, Program, ToolPath
 from sicp_postprocessors.base import SAFETY_NOTE, failures, head_remarks
-from sicp_postprocessors.checks import event_findings, first_move_findings, move_place, name_findings
+from sicp_postprocessors.checks import event_findings, first_move_findings, move_place, name_findings, spindle_findings
 from sicp_postprocessors.moves import (
     Moves,
     events_by_move,
@@ -112,6 +112,7 @@ class LinePostprocessor(Verbs):
             *super().preflight(program),
             *name_findings(program, self.program_name(program)),
             *first_move_findings(path),
+            *spindle_findings(path, self.stops_spindle),
             *event_findings(path.events, lost, f"post {self.name} has no words for it"),
             *event_findings(unknown, unwritten, f"post {self.name} has no words for it"),
             *self._part_findings(path),

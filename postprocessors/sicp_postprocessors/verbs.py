@@ -137,6 +137,10 @@ class Verbs(Postprocessor):
         """Return the events in order, as the controller is told of them."""
         return events_in_order(program.path)
 
+    def stops_spindle(self, event: Event) -> bool:
+        """Say whether the machine stops the spindle at an event that does not say so itself, such as a tool change."""
+        return False
+
     def switched(self, event: Event) -> tuple[str, bool] | None:
         """Return the output that an event of kind OTHER switches, and how; None if it switches none."""
         return None

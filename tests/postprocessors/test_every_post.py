@@ -297,3 +297,18 @@ def test_words_of_another_dialect_are_told_and_not_written(post):
 
 def test_the_nasty_text_is_the_one_meant():
     assert "\n" in NASTY and "]]>" in NASTY
+
+
+@pytest.mark.parametrize("before", [0, 2])
+@pytest.mark.parametrize("post", [GCode(), Val3()], ids=lambda post: post.name)
+def test_a_tool_change_that_leaves_the_spindle_off_in_a_cut_is_refused(post, before):
+    on, change = Event(0, EventKind.SPINDLE, 9000.0, line=2), Event(before, EventKind.TOOL, 3.0, line=3)
+    again = Event(before, EventKind.SPINDLE, 9000.0, line=4)
+    by_hand = post.name == "val3" and before == 0  # the tool that the path begins with is in the hand of the robot
+    if not by_hand:
+        with pytest.raises(PathError, match=f"before move {before}, line 3: cuts with the spindle off after a tool"):
+            post.write(straight_program(4, events=(on, change)))
+    assert post.write(straight_program(4, events=(on, change, again)))
+    assert post.write(straight_program(4, events=(change,)))
+    after = Event(4, EventKind.TOOL, 3.0, line=3)
+    assert post.write(straight_program(4, events=(on, after)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from sicp_cam.errors import OutputError
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import FloatArray, Program, ToolPath
+from sicp_cam.model import Event, EventKind, FloatArray, Program, ToolPath
 from sicp_cam.units import mm_per_unit
 from sicp_postprocessors.base import failures
 from sicp_postprocessors.checks import frame_findings, frame_name
@@ -188,6 +188,10 @@ class GCode(LinePostprocessor):
             yield line.format(unit=unit, feed="G93" if options.states_time else "G94", path=tolerance)
         if options.work_offset:
             yield options.work_offset
+
+    def stops_spindle(self, event: Event) -> bool:
+        """Say that M6 stops the spindle, wherever it stands."""
+        return event.kind is EventKind.TOOL
 
     def tool(self, number: int, text: str, *, first: bool) -> Iterator[str]:
         """Return a tool change, or tip control alone for the tool that is in the spindle."""
