@@ -205,8 +205,8 @@ class RobotPostprocessor(LinePostprocessor):
         if event.value == 0.0:
             text = "spindle off: no output is named for it"
             return Event(event.before_move, EventKind.COMMENT, 0.0, text, event.line)
-        sense = "counter-clockwise" if event.value < 0.0 else "clockwise"
-        text = f"start the spindle: {trimmed(abs(event.value), 3)} rev/min {sense}"
+        # Short, since pendants show 40 letters.
+        text = f"start spindle {'ccw' if event.value < 0.0 else 'cw'}, {trimmed(abs(event.value), 3)} rev/min"
         return Event(event.before_move, EventKind.STOP, 0.0, text, event.line)
 
     def _commands_speed(self) -> bool:

@@ -441,7 +441,7 @@ class TestSpindleAndTools:
         )
         app, result = read_val3(Val3(PLACED).write(straight_program(3, events=events)))
         assert not any(name.startswith("do") for name in app.data)
-        start = result.actions.index(("comment", "stop: start the spindle: 5000 rev/min clockwise"))
+        start = result.actions.index(("comment", "stop: start spindle cw, 5000 rev/min"))
         assert [kind for kind, _ in result.actions[start + 1 : start + 4]] == ["reset", "operator", "movej"]
         told = [value for kind, value in result.actions if kind == "comment"]
         assert "coolant on: no output is named for it" in told and "spindle off: no output is named for it" in told

@@ -22,8 +22,8 @@ MODULE porthole
   PROC porthole_001p()
     ! tool 3 LOADTL/3
     WaitRob \InPos;
-    ! stop: start the spindle: 12000 rev/min clockwise
-    TPWrite "stop: start the spindle: 12000 rev/min c";
+    ! stop: start spindle cw, 12000 rev/min
+    TPWrite "stop: start spindle cw, 12000 rev/min";
     Stop;
     MoveJ [[100.0000,0.0000,5.0000],[0.0000000,0.9894004,0.0000000,-0.1452131],[0,-1,0,1],[9E9,9E9,9E9,9E9,9E9,9E9]],vStart,fine,tSpindle\WObj:=wFix;
     ! coolant on: no output is named for it
