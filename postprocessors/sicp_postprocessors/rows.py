@@ -35,8 +35,8 @@ def rows(template: str, *columns: Column) -> list[str]:
     ----------
     template
         Printable ASCII, with line feeds where a row has several lines. Fields: `{:.4}` a number with 4 decimals,
-        `{:+.4}` always with its sign, `{:.4t}` without zeros at its end, `{:d}` a whole number, `{}` a text as `words`
-        returns it.
+        `{:+.4}` always with its sign, `{:.4t}` without zeros at its end, `{:.4p}` so but with its dot, `{:d}` a whole
+        number, `{}` a text as `words` returns it.
     columns
         Arrays of n numbers, or texts.
 
@@ -47,6 +47,8 @@ def rows(template: str, *columns: Column) -> list[str]:
 
     >>> rows("X{:.3} Y{:+.1}{}", [1.0, -0.0004], [0.25, -2.0], words(["", " F600"]))
     ['X1.000 Y+0.2', 'X0.000 Y-2.0 F600']
+    >>> rows("F{:.3p}", [200.0, 1.5])
+    ['F200.', 'F1.5']
     >>> rows("p[{:d}]\n{:.3t}", [9, 10], [0.5, 200.0])
     ['p[9]\n0.5', 'p[10]\n200']
     """
@@ -90,8 +92,9 @@ def _field(column: npt.NDArray[Any], kind: str) -> Bytes:
     if kind == "d":
         return _digits(column.astype(np.float64), 0)
     sign, _, decimals = kind.partition(".")
-    chars = _digits(column, int(decimals.rstrip("t")), signed=sign == "+")
-    return _trimmed(chars, int(decimals.rstrip("t"))) if decimals.endswith("t") else chars
+    count = int(decimals.rstrip("tp"))
+    chars = _digits(column, count, signed=sign == "+")
+    return _trimmed(chars, count, point=decimals.endswith("p")) if decimals[-1] in "tp" else chars
 
 
 def _digits(values: npt.NDArray[Any], decimals: int, *, signed: bool = False) -> Bytes:
@@ -130,12 +133,12 @@ def _four_digits() -> Bytes:
     return table
 
 
-def _trimmed(chars: Bytes, decimals: int) -> Bytes:
-    """Take zeros off the end of numbers, and a dot that nothing follows."""
+def _trimmed(chars: Bytes, decimals: int, *, point: bool) -> Bytes:
+    """Take zeros off the end of numbers, and a dot that nothing follows unless `point` keeps it."""
     nothing = np.ones(len(chars), np.bool_)
     for place in range(chars.shape[1] - 1, chars.shape[1] - 1 - decimals, -1):
         nothing &= chars[:, place] == _ZERO
         chars[nothing, place] = 0
-    if decimals:
+    if decimals and not point:
         chars[nothing, chars.shape[1] - 1 - decimals] = 0
     return chars

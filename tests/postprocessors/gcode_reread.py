@@ -43,7 +43,7 @@ class Blocks:
         return np.array(self.xyz), self.turn, np.array(self.feeds), np.array(self.rapid)
 
 
-NUMBER = r"[+-]?[0-9]+(?:\.[0-9]+)?"
+NUMBER = r"[+-]?[0-9]+(?:\.[0-9]*)?"
 WORD = re.compile(rf"([A-Z][0-9]=|N[XYZ]|T[XYZ]|[A-Z])({NUMBER})")
 HEIDENHAIN = re.compile(r"(BEGIN|END) PGM [A-Z][A-Z0-9_]* MM|CYCL DEF 9\.0 DWELL TIME|STOP|CALL PGM .*|TOOL CALL .*")
 SIEMENS = ("TRAORI", "TRAFOOF", "ORIWKS ORIVECT", "ORIWKS ORIAXES")

@@ -39,7 +39,7 @@ def read_csv(files):
     return result, rows
 
 
-WORD = re.compile(r"([A-Z][0-9]*=|[A-Z])([+-]?[0-9]+(?:\.[0-9]+)?)")
+WORD = re.compile(r"([A-Z][0-9]*=|[A-Z])([+-]?[0-9]+(?:\.[0-9]*)?)")
 
 
 def read_gcode(files, head="AC"):

@@ -73,7 +73,7 @@ def test_what_still_runs_is_switched_off_at_the_end():
 def test_feed_stands_where_it_changes_and_after_rapid_moves():
     program = straight_program(6, feed=[0, 100, 100, 200, 0, 200], rapid=[True, False, False, False, True, False])
     lines = [x for x in text_of(GCode().write(program)).splitlines() if x.startswith(("G0", "G1"))]
-    assert [x.split("F")[1] if "F" in x else "" for x in lines] == ["", "100", "", "200", "", "200"]
+    assert [x.split("F")[1] if "F" in x else "" for x in lines] == ["", "100.", "", "200.", "", "200."]
 
 
 @pytest.mark.parametrize(

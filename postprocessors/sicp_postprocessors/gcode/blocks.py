@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from sicp_cam.errors import OutputError
 from sicp_postprocessors.gcode.dialects import Dialect
-from sicp_postprocessors.gcode.feeds import INVERSE_DECIMALS
+from sicp_postprocessors.gcode.feeds import feed_decimals
 from sicp_postprocessors.gcode.machine import Machine
 from sicp_postprocessors.gcode.options import GCodeOptions
 from sicp_postprocessors.moves import Moves
@@ -18,8 +18,7 @@ from sicp_postprocessors.rows import rows
 
 __all__ = ["block_texts", "numbered"]
 
-_FEED_DECIMALS = {"mm": 3, "inch": 5}
-_BETWEEN = ("; ", "M126", "M128", "FUNCTION TCPM")
+_BETWEEN = ("; ", "M126", "M127", "M128", "FUNCTION TCPM")
 """What may stand between a tool call of Heidenhain and the speed that belongs to it."""
 
 
@@ -51,11 +50,11 @@ def block_texts(moves: Moves, options: GCodeOptions, machine: Machine | None, *,
     if rapid:
         code, end = codes[0], codes[2]
     elif options.states_time:
-        feed = f" F{{:.{INVERSE_DECIMALS}t}}"
+        feed = f" F{_feed_format(options)}"
         columns.append(moves.feeds_mm_min)
     else:
         feed = "{}"
-        columns.append(_feed_words(moves, _FEED_DECIMALS[options.units]))
+        columns.append(_feed_words(moves, _feed_format(options)))
     tips = f"X{place} Y{place} Z{place}"
     return rows(control.block.format(code=code, tips=tips, turn=turn, feed=feed, end=end), *columns)
 
@@ -86,9 +85,13 @@ def numbered(lines: Iterable[str], control: Dialect, step: int) -> list[str]:
     return [line if line[0] in free else before.format((next(count) % within + 1) * step) + line for line in told]
 
 
-def _feed_words(moves: Moves, decimals: int) -> npt.NDArray[np.bytes_]:
+def _feed_format(options: GCodeOptions) -> str:
+    return f"{{:.{feed_decimals(options)}{'p' if options.control.feed_point else 't'}}}"
+
+
+def _feed_words(moves: Moves, form: str) -> npt.NDArray[np.bytes_]:
     stated = np.flatnonzero(moves.states_feed)
-    texts = rows(f" F{{:.{decimals}t}}", moves.feeds_mm_min[stated])
+    texts = rows(f" F{form}", moves.feeds_mm_min[stated])
     column = np.zeros(len(moves), f"S{max(map(len, texts), default=1)}")
     column[stated] = texts
     return column

@@ -40,7 +40,7 @@ class Dialect:
         For each of them, the lines that switch tool tip control on; `{tool}` is the H word of the tool, or nothing.
     length_on, length_off
         Words of the tool length, where they are not those of tip control: `{tool}` is the H word; left out without a
-        tool's number.
+        tool's number. `loaded_length` takes the length of the tool in the spindle; empty where no word does.
     tip_off
         The word that switches it off, before a tool change and at the end; may be empty.
     tip_control
@@ -64,17 +64,25 @@ class Dialect:
         "plain" or "upper": names hold letters, digits and underscores only, two letters first or all capitals; the
         file is called like the program; empty where the control takes the name of any file.
     number
-        Template of the O line, empty where programs have no numbers; `smallest_number` where one must have it.
+        Template of the O line, empty where programs have no numbers; `smallest_number` where one must have it;
+        `largest_program` the largest of a program, `largest_called` of one that M98 calls.
     tool, spindle, pause, stop
         Lines of events.
     offset
         An example of a work offset; empty where one is not chosen by a word.
     block_number, unnumbered, always_numbered, largest_number
         How blocks are numbered, first characters of lines that are not, whether all are, when they restart.
-    shorter_way
-        The word by which rotary axes go the shorter way, within a turn; empty where that is a setting of the machine.
-    largest_inverse
-        Largest F under G93; None where the control has no G93.
+    shorter_way, stated_way
+        The words by which rotary axes go the shorter way, within a turn, and to the very angle that is stated; empty
+        where that is a setting of the machine.
+    largest_inverse, inverse_decimals
+        Largest F under G93, and its decimals; None where the control has no G93.
+    feed_point
+        F always has a point: some controls read one without it in thousandths.
+    largest_feed
+        Largest F per minute, None where no limit is known.
+    dwells
+        Words of the dwell time that may be chosen.
     """
 
     family: str
@@ -87,6 +95,7 @@ class Dialect:
     inch: str | None = "G20"
     length_on: str = ""
     length_off: str = ""
+    loaded_length: str = ""
     tip_control: bool = True
     modes: tuple[str, ...] = ("{unit} G90 {feed} G17 G40",)
     vector: str = "I{} J{} K{}"
@@ -99,6 +108,8 @@ class Dialect:
     named: str = ""
     number: str = ""
     smallest_number: int | None = None
+    largest_program: int = 99_999_999
+    largest_called: int = 9_999
     tool: tuple[str, ...] = ("T{tool} M6",)
     spindle: tuple[tuple[str, ...], tuple[str, ...]] = (("S{speed} M3",), ("S{speed} M4",))
     pause: tuple[str, ...] = ("G4 P{seconds}",)
@@ -110,7 +121,12 @@ class Dialect:
     largest_number: int = 99_999
     longest_line: int = 255
     shorter_way: str = ""
+    stated_way: str = ""
     largest_inverse: float | None = 99_999.0
+    inverse_decimals: int = 4
+    feed_point: bool = False
+    largest_feed: float | None = None
+    dwells: tuple[str, ...] = ()
     subprograms: Subprograms | None = None
     vector_decimals: int = 6
 
@@ -137,7 +153,13 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             first=("%",),
             last=("M30", "%"),
             number="O{:04d}",
+            length_on="G43{tool}",
+            length_off="G49",
             pause=("G4 X{seconds}",),
+            largest_inverse=9_999.999,
+            inverse_decimals=3,
+            feed_point=True,
+            dwells=("X", "P_MS"),
             subprograms=_ISO_SUB,
         ),
         # G710 and G700 are Siemens' own metric and inch, feeds included. ORIWKS and ORIVECT or ORIAXES say in which
@@ -154,6 +176,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             inch="G700",
             vector="A3={} B3={} C3={}",
             pause=("G4 F{seconds}",),
+            dwells=("F",),
             unnumbered="%;",
             longest_line=512,
             subprograms=Subprograms("{name}", (), ("M17",), suffix=".spf"),
@@ -167,7 +190,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
                     "vector": f"TX TY TZ {_TOWARDS_HOLDER}, NX NY NZ repeat it: tool deltas must be 0",
                 }
             ),
-            tip_on=MappingProxyType({"rotary": ("M126", "M128"), "vector": ("M128",)}),
+            tip_on=MappingProxyType({"rotary": ("M128",), "vector": ("M128",)}),
             tip_off="M129",
             suffix=".H",
             comment="; {}",
@@ -192,6 +215,8 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             always_numbered=True,
             largest_number=999_999_999,
             shorter_way="M126",
+            stated_way="M127",
+            largest_feed=99_999.0,
             largest_inverse=None,
             subprograms=Subprograms("CALL PGM {name}.H", ("BEGIN PGM {name} MM",), ("END PGM {name} MM",)),
             vector_decimals=7,
@@ -207,6 +232,14 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             last=("M30", "%"),
             number="O{:05d}",
             smallest_number=1,
+            largest_program=99_999,
+            largest_called=99_999,
+            length_on="G43{tool}",
+            length_off="G49",
+            largest_inverse=9_999.999,
+            inverse_decimals=3,
+            feed_point=True,
+            dwells=("P", "P_MS"),
             subprograms=_ISO_SUB,
         ),
         # No tip control of its own: kinematics with M428 or the like are the site's, and so are those words.
@@ -217,12 +250,14 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             tip_off="",
             length_on="G43{tool}",
             length_off="G49",
+            loaded_length="G43",
             suffix=".ngc",
             comment="({})",
             modes=("{unit} G90 {feed} G17 G40", "G64 P{path}"),
             first=("%",),
             last=("M30", "%"),
             largest_inverse=1e7,
+            dwells=("P",),
             subprograms=Subprograms("o<{name}> call", ("o<{name}> sub",), ("o<{name}> endsub", "M2"), lower_case=True),
         ),
         "plain": Dialect(
@@ -238,6 +273,10 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             first=("%",),
             last=("M30", "%"),
             number="O{:04d}",
+            largest_inverse=9_999.999,
+            inverse_decimals=3,
+            feed_point=True,
+            dwells=("P", "X", "P_MS", "F"),
             subprograms=_ISO_SUB,
         ),
     }

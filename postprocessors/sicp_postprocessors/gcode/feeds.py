@@ -11,11 +11,22 @@ from sicp_postprocessors.gcode.options import GCodeOptions
 from sicp_postprocessors.gcode.positions import Positions
 from sicp_postprocessors.numbers import rounded
 
-__all__ = ["INVERSE_DECIMALS", "LEAST_INVERSE", "feeds_of", "only_turns"]
+__all__ = ["feed_decimals", "feeds_of", "least_feed", "only_turns"]
 
-INVERSE_DECIMALS = 4
-LEAST_INVERSE = 0.01
-"""Below this, that is for moves of more than 100 minutes, the decimals do not state a feed well."""
+_DECIMALS = {"mm": 3, "inch": 4}
+_LEAST_STEPS = 100
+"""Below so many units of the last decimal the decimals do not state an inverse time well."""
+
+
+def feed_decimals(options: GCodeOptions) -> int:
+    """Return the decimals of F."""
+    return options.control.inverse_decimals if options.states_time else _DECIMALS[options.units]
+
+
+def least_feed(options: GCodeOptions) -> float:
+    """Return the least number behind F that its decimals state: smaller ones of inverse time lose too much."""
+    step: float = 10.0 ** -feed_decimals(options)
+    return _LEAST_STEPS * step if options.states_time else step / 2.0
 
 
 def feeds_of(positions: Positions, options: GCodeOptions) -> FloatArray:

@@ -1,36 +1,34 @@
 """What the operator of a five-axis control should know of a program, or why it may not be written.
 
-Codes: 620 an axis is held at the pole, 621 beyond the travel, 622 a large turn in one cut, 623 no work offset,
-624 a direction out of reach, 625 moves divided or not divided enough, 626 what the control must see to itself,
-627 rapid moves whose tip leaves the straight line, 628 inverse time, 629 linear travel.
+Codes: 620 an axis is held at the pole, 621 beyond the travel, 622 a tool axis that leaves its way in a cut, 624 a
+direction out of reach, 625 moves divided or not divided enough, 626 what the control must see to itself, 627 rapid
+moves that turn far, or whose tip leaves the straight line, 629 linear travel. More of them in `control_findings`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS
-from sicp_cam.model import BoolArray, FloatArray, IntArray, Program
-from sicp_postprocessors.checks import frame_name, in_scan_frame, stretch_findings
+from sicp_cam.model import BoolArray, FloatArray, Program
+from sicp_postprocessors.checks import in_scan_frame, move_place, stretch_findings
 from sicp_postprocessors.gcode.along import Angles, over_travel
 from sicp_postprocessors.gcode.divide import axis_turns_deg
-from sicp_postprocessors.gcode.feeds import LEAST_INVERSE
-from sicp_postprocessors.gcode.forward import axes_of
 from sicp_postprocessors.gcode.options import GCodeOptions
-from sicp_postprocessors.gcode.positions import Positions, Setting
+from sicp_postprocessors.gcode.positions import Positions
+from sicp_postprocessors.gcode.setting import Setting
+from sicp_postprocessors.gcode.ways import axis_deviations_deg, rotary_turns_deg
 from sicp_postprocessors.moves import tools_in_use
 from sicp_postprocessors.options import flag
-from sicp_postprocessors.orientations import axis_errors_deg
 from sicp_postprocessors.text import counted
 
 __all__ = [
-    "control_findings",
     "division_findings",
     "rotary_findings",
-    "time_findings",
     "travel_findings",
     "without_tip_findings",
 ]
@@ -38,24 +36,10 @@ __all__ = [
 _ALLOWED_DEG = 2.0
 """How far the tool axis may leave the shortest way where the travel makes an axis turn back within a cut."""
 _OPPOSITE_DEG = 179.9
-
-
-def control_findings(post: str, program: Program, options: GCodeOptions) -> Iterator[Finding]:
-    """Return what the control must hold or do that the program does not say."""
-    if not options.work_offset:
-        message = (
-            f"no work offset is written: the coordinates are those of the {frame_name(program)} frame, and the active "
-            "offset must hold that frame"
-        )
-        if options.control.offset:
-            message += f"; name one with {flag(post, 'work_offset', options.control.offset)}"
-        yield Finding(623, Level.INFO, message)
-    if options.dialect == "linuxcnc" and options.knows_tip and not options.tcp_on:
-        message = (
-            "no words switch the kinematics that hold the tip: they must be active; if the site has words for it, name "
-            f"them with {flag(post, 'tcp_on', 'M428')} and {flag(post, 'tcp_off', 'M429')}"
-        )
-        yield Finding(626, Level.WARN, message)
+_BENT_DEG = 0.1
+"""How far the tool axis may leave the shortest way between two blocks before that is told."""
+_REWIND_DEG = 90.0
+"""A rapid move on which a rotary axis turns further than this is told."""
 
 
 def rotary_findings(
@@ -111,12 +95,10 @@ def _turn_findings(
     post: str, program: Program, options: GCodeOptions, setting: Setting, positions: Positions, angles: Angles
 ) -> Iterator[Finding]:
     deg, written = angles.deg, positions.program.path
-    steps = np.zeros(len(deg))
-    steps[1:] = np.abs(np.diff(deg, axis=0)).max(axis=1, initial=0.0)
-    large = (steps > options.rotary_step_deg) & ~written.rapid
-    doubtful = np.flatnonzero((large | angles.forced) & (np.arange(len(deg)) > 0))
+    turns = np.abs(rotary_turns_deg(setting.machine, deg)).max(axis=1, initial=0.0)
+    cuts = np.flatnonzero(~written.rapid & (np.arange(len(deg)) > 0))
     off = np.zeros(len(deg))
-    off[doubtful] = _way_errors_deg(setting, deg, written.axes, doubtful)
+    off[cuts] = axis_deviations_deg(setting.machine, deg, written.axes, cuts)
     turned_back = angles.forced & (off > _ALLOWED_DEG)
     yield from stretch_findings(
         program.path,
@@ -126,36 +108,33 @@ def _turn_findings(
         f"the travel of the axes makes them turn over within a cut, where the tool axis would leave its way by up to "
         f"{float(off[turned_back].max(initial=0.0)):.1f} degrees; retract there in CAM, or choose another machine",
     )
-    fast = (
+    divide = flag(post, "max_axis_step_deg", f"{min(options.axis_step_deg or math.inf, 6.0) / 2.0:g}")
+    large = (turns > options.rotary_step_deg) & ~written.rapid & ~turned_back
+    message = (
         f"a rotary axis turns further than {options.rotary_step_deg:g} degrees in one cutting move, and the tool axis "
         f"leaves the shortest way by up to {float(off[large].max(initial=0.0)):.2f} degrees; divide the move with "
-        f"{flag(post, 'max_axis_step_deg', '3')}, or allow it with {flag(post, 'rotary_step_deg', 'degrees')}"
+        f"{divide}, or allow it with {flag(post, 'rotary_step_deg', 'degrees')}"
     )
-    yield from stretch_findings(program.path, positions.told(large & ~turned_back), 622, Level.WARN, fast)
+    yield from stretch_findings(program.path, positions.told(large), 622, Level.WARN, message)
+    bent = (off > _BENT_DEG) & ~large & ~turned_back
+    message = (
+        "between the blocks the tool axis leaves the shortest way by up to "
+        f"{float(off[bent].max(initial=0.0)):.2f} degrees, as both rotary axes turn; divide the moves with {divide}"
+    )
+    yield from stretch_findings(program.path, positions.told(bent), 622, Level.WARN, message)
+    yield from _rewind_findings(program, positions, turns)
 
 
-def _way_errors_deg(setting: Setting, deg: FloatArray, axes: FloatArray, moves: IntArray) -> FloatArray:
-    """Return how far the tool axis leaves the shortest way on some moves, the most of three places on it.
-
-    Between the two axes the distance from their great circle counts, beyond them that from the nearer one.
-    """
-    start, end = axes[moves - 1], axes[moves]
-    normal, middle = _units(np.cross(start, end)), _units(start + end)
-    has_circle = np.einsum("ni,ni->n", normal, normal) > 0.5
-    worst = np.zeros(len(moves))
-    for share in (0.25, 0.5, 0.75):
-        on_way = axes_of(setting.machine, deg[moves - 1] + share * (deg[moves] - deg[moves - 1]))
-        across = np.arcsin(np.minimum(np.abs(np.einsum("ni,ni->n", on_way, normal)), 1.0))
-        between = np.einsum("ni,ni->n", on_way, middle) >= np.einsum("ni,ni->n", start, middle)
-        nearer = np.minimum(axis_errors_deg(on_way, start), axis_errors_deg(on_way, end))
-        worst = np.maximum(worst, np.where(between & has_circle, np.degrees(across), nearer))
-    return worst
-
-
-def _units(vectors: FloatArray) -> FloatArray:
-    """Return vectors of length 1, but for those without a direction."""
-    units: FloatArray = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
-    return units
+def _rewind_findings(program: Program, positions: Positions, turns_deg: FloatArray) -> Iterator[Finding]:
+    """Return which rapid moves turn an axis far: the control does that at full speed, and with it tool or part."""
+    rewinds = np.flatnonzero((turns_deg > _REWIND_DEG) & positions.program.path.rapid)
+    for move in rewinds.tolist():
+        message = (
+            f"a rotary axis turns by up to {turns_deg[move]:.1f} degrees in one rapid move; see that there is room, or "
+            "retract further there in CAM"
+        )
+        place = move_place(program.path, int(positions.origin[move]))
+        yield Finding(627, Level.WARN, message, place)
 
 
 def division_findings(post: str, program: Program, options: GCodeOptions, positions: Positions) -> Iterator[Finding]:
@@ -215,7 +194,8 @@ def without_tip_findings(
         625,
         Level.FAIL,
         f"without tip control the tip leaves its straight way by up to {float(off[cuts].max(initial=0.0)):.3f} mm, as "
-        "an axis turns while the tool hardly does; keep the tool off the pole in CAM, or use tip control",
+        "an axis turns while the tool hardly does; keep the tool off the pole in CAM, hold the axis there with "
+        f"{flag(post, 'singular_cone_deg', '0.01')}, or use tip control",
     )
     rapids = (off > 1.0) & written.rapid
     if rapids.any():
@@ -247,27 +227,3 @@ def travel_findings(
         over: BoolArray = (gauge[:, i] < low) | (gauge[:, i] > high)
         message = f"{'XYZ'[i]} leaves its travel {low:g} to {high:g} mm; place the part elsewhere on the machine"
         yield from stretch_findings(program.path, positions.told(over), 629, Level.FAIL, message)
-
-
-def time_findings(
-    program: Program, options: GCodeOptions, positions: Positions, feeds: FloatArray
-) -> Iterator[Finding]:
-    """Return which cutting moves have a time that cannot be written as inverse time."""
-    if not options.states_time:
-        return
-    written = positions.program.path
-    begins = np.zeros(len(feeds), np.bool_)
-    begins[:1] = ~written.rapid[:1]
-    yield from stretch_findings(
-        program.path,
-        positions.told(begins),
-        628,
-        Level.FAIL,
-        "the path begins with a cutting move, whose time is not known; begin with a rapid move",
-    )
-    long = (feeds < LEAST_INVERSE) & ~written.rapid & ~begins
-    message = f"the move takes more than {1.0 / LEAST_INVERSE:g} minutes, too long for inverse time; divide it in CAM"
-    yield from stretch_findings(program.path, positions.told(long), 628, Level.FAIL, message)
-    short = (feeds >= (options.control.largest_inverse or np.inf)) & ~written.rapid & ~begins
-    message = f"the move takes less than 1/{options.control.largest_inverse:g} minutes and is made slower"
-    yield from stretch_findings(program.path, positions.told(short), 628, Level.INFO, message)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -16,6 +17,10 @@ __all__ = ["GCodeOptions"]
 
 _PLAIN_STEP_DEG = 3.0
 _NUMBER = Between(1, 99_999_999)
+_OFFSET = re.compile(
+    r"G5[4-9]|G54\.1 ?P[1-9][0-9]{0,2}|G59\.[1-3]|G154 ?P[1-9][0-9]?|G5(00|0[5-9]|[1-9][0-9])", re.ASCII
+)
+"""Fanuc, Haas, LinuxCNC and Siemens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +127,11 @@ class GCodeOptions(PreflightOptions):
         return next(iter(self.control.orientations)) if self.orientation == "auto" else self.orientation
 
     @property
+    def machine_name(self) -> str:
+        """Name of the machine of rotary words; without one both axes are in the head, as `kinematics` says."""
+        return self.machine or f"head-{self.kinematics.lower()}"
+
+    @property
     def knows_tip(self) -> bool:
         """Say whether the control keeps the tip on the path while the axes turn."""
         return self.control.tip_control if self.tip_control == "auto" else self.tip_control == "on"
@@ -163,8 +173,7 @@ class GCodeOptions(PreflightOptions):
         JobError
             If it is not known, or with every problem of its file.
         """
-        named = self.machine or f"head-{self.kinematics.lower()}"
-        return load_machine(named).limited(
+        return load_machine(self.machine_name).limited(
             self.turn_limits_deg, self.tilt_limits_deg, None if self.wrap == "auto" else self.wrap
         )
 
@@ -182,11 +191,20 @@ class GCodeOptions(PreflightOptions):
         return f"{kinds.get(first, control.family)}: {words}"
 
     def _word_problems(self) -> list[str]:
-        return [
-            f"option {name!r} must be words of the control, without ( ) % ; /"
-            for name in ("tcp_on", "tcp_off", "work_offset")
-            if set("()%;/") & set(getattr(self, name))
-        ]
+        told = []
+        for name in ("tcp_on", "tcp_off"):
+            text = getattr(self, name)
+            words = text.replace("{tool}", "") if name == "tcp_on" else text
+            if text and not (words.strip() and words.isascii() and words.isprintable()):
+                told.append(f"option {name!r} must be words of the control on one line, such as M428")
+            if set("()%;/") & set(words):
+                told.append(f"option {name!r} must be words of the control, without ( ) % ; /")
+            if set("{}") & set(words):
+                known = "{tool} is all that may stand in braces" if name == "tcp_on" else "braces mean nothing there"
+                told.append(f"option {name!r} is not words of the control: {known}")
+        if self.work_offset and not _OFFSET.fullmatch(self.work_offset):
+            told.append("option 'work_offset' must be one word, such as G54, G54.1 P3, G154 P12 or G505")
+        return told
 
     def _meaning_problems(self) -> list[str]:
         """Return the problems that only options together have."""
@@ -199,8 +217,15 @@ class GCodeOptions(PreflightOptions):
             told.append(f"option 'inverse_time' has no meaning for dialect {self.dialect}, which knows tip control")
         if self.max_moves_per_program and control.subprograms and control.subprograms.numbered and not self.number:
             told.append("option 'max_moves_per_program' needs 'program_number', from which subprograms are counted")
-        if self.dwell and len(control.pause) > 1:
-            told.append(f"option 'dwell' has no meaning for dialect {self.dialect}, which has lines of its own for it")
+        calls = self.max_moves_per_program and control.subprograms and control.subprograms.numbered
+        largest = control.largest_called - 1 if calls else control.largest_program
+        if (self.number or 0) > largest and control.number:
+            told.append(f"option 'program_number' must be at most {largest} for dialect {self.dialect_name}")
+        if self.work_offset and not control.offset:
+            told.append(f"option 'work_offset' has no meaning for dialect {self.dialect_name}; set it on the control")
+        if self.dwell and self.dwell not in control.dwells:
+            known = f"must be {' or '.join(control.dwells)}" if control.dwells else "has no meaning"
+            told.append(f"option 'dwell' {known} for dialect {self.dialect_name}")
         if self.words == "vector":
             if not self.knows_tip:
                 told.append("option 'tip_control' off needs orientation rotary: the machine moves two rotary axes")

@@ -11,36 +11,21 @@ from sicp_cam.model import BoolArray, FloatArray, IntArray, Program
 from sicp_cam.units import mm_per_unit
 from sicp_postprocessors.gcode.along import Angles, angles_along
 from sicp_postprocessors.gcode.divide import axis_turns_deg, divided, last_pieces
-from sicp_postprocessors.gcode.forward import axes_of, linear_positions, tips_of
+from sicp_postprocessors.gcode.forward import axes_of
 from sicp_postprocessors.gcode.machine import Machine
 from sicp_postprocessors.gcode.options import GCodeOptions
+from sicp_postprocessors.gcode.setting import Setting
+from sicp_postprocessors.gcode.ways import tip_deviations_mm
 from sicp_postprocessors.numbers import rounded
 from sicp_postprocessors.orientations import axis_errors_deg
 
-__all__ = ["Positions", "Setting", "positions_of"]
+__all__ = ["Positions", "positions_of"]
 
 _MOST_PIECES = 10_000
 _PASSES = 6
 _SLACK = 1e-6
 _LEAST_AXIS_DEG = 0.01
 """Pieces on which the tool axis turns less are not divided: at the pole an axis may turn while the tool stays."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Setting:
-    """The machine, and how program and tool are set up in it."""
-
-    machine: Machine
-    tool_length_mm: float = 0.0
-    zero_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def linear(self, deg: FloatArray, tips_mm: FloatArray) -> FloatArray:
-        """Return the linear axes (n, 3), as programmed, for tips (n, 3) at angles (n, 2)."""
-        return linear_positions(self.machine, deg, tips_mm, self.tool_length_mm, np.array(self.zero_mm))
-
-    def tips(self, deg: FloatArray, linear_mm: FloatArray) -> FloatArray:
-        """Return the tips (n, 3) at programmed linear axes (n, 3) and angles (n, 2), by forward kinematics."""
-        return tips_of(self.machine, deg, linear_mm, self.tool_length_mm, np.array(self.zero_mm))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +100,7 @@ def _angles(program: Program, options: GCodeOptions, setting: Setting | None) ->
 def _off_way_mm(program: Program, options: GCodeOptions, setting: Setting | None, angles: Angles | None) -> FloatArray:
     if setting is None or angles is None or options.knows_tip:
         return np.zeros(len(program.path))
-    return _tip_deviations_mm(setting, angles.deg, program.path.tips_mm)
+    return tip_deviations_mm(setting, angles.deg, program.path.tips_mm)
 
 
 def _needed(program: Program, options: GCodeOptions, angles: Angles | None, off: FloatArray) -> IntArray:
@@ -134,14 +119,6 @@ def _needed(program: Program, options: GCodeOptions, angles: Angles | None, off:
     needed[path.rapid] = 1
     needed[:1] = 1
     return needed
-
-
-def _tip_deviations_mm(setting: Setting, deg: FloatArray, tips_mm: FloatArray) -> FloatArray:
-    """Return how far the tip is from its straight way (m,), half way, if all axes move evenly and no control helps."""
-    linear = setting.linear(deg, tips_mm)
-    half_way = setting.tips((deg[1:] + deg[:-1]) / 2.0, (linear[1:] + linear[:-1]) / 2.0)
-    off = np.linalg.norm(half_way - (tips_mm[1:] + tips_mm[:-1]) / 2.0, axis=1)
-    return np.concatenate([np.zeros(min(1, len(deg))), off])
 
 
 def _written(

@@ -14,19 +14,25 @@ from sicp_cam.units import mm_per_unit
 from sicp_postprocessors.base import failures
 from sicp_postprocessors.checks import frame_findings, frame_name
 from sicp_postprocessors.gcode.blocks import block_texts, numbered
+from sicp_postprocessors.gcode.control_findings import (
+    control_findings,
+    feed_findings,
+    named_at_start,
+    number_findings,
+)
 from sicp_postprocessors.gcode.feeds import feeds_of
 from sicp_postprocessors.gcode.findings import (
-    control_findings,
     division_findings,
     rotary_findings,
-    time_findings,
     travel_findings,
     without_tip_findings,
 )
 from sicp_postprocessors.gcode.machine import Machine
 from sicp_postprocessors.gcode.options import GCodeOptions
-from sicp_postprocessors.gcode.positions import Positions, Setting, positions_of
+from sicp_postprocessors.gcode.positions import Positions, positions_of
 from sicp_postprocessors.gcode.proof import prove
+from sicp_postprocessors.gcode.setting import Setting
+from sicp_postprocessors.gcode.site_words import lacks_length, takes_loaded_length, tip_off_words, tip_on_words
 from sicp_postprocessors.gcode.subprograms import with_subprograms
 from sicp_postprocessors.numbers import fixed, trimmed
 from sicp_postprocessors.template import LinePostprocessor, Moves
@@ -115,7 +121,8 @@ class GCode(LinePostprocessor):
         findings += division_findings(self.name, program, self.options, positions)
         if failures(findings):
             return findings
-        findings += time_findings(program, self.options, positions, feeds_of(positions, self.options))
+        findings += number_findings(self.name, len(self.parts(positions.program.path)), self.options)
+        findings += feed_findings(program, self.options, positions, feeds_of(positions, self.options))
         if self._setting is not None:
             about = (self.name, program, self.options, self._setting, positions)
             findings += [*rotary_findings(*about), *without_tip_findings(*about), *travel_findings(*about)]
@@ -165,6 +172,11 @@ class GCode(LinePostprocessor):
             yield "feeds as inverse time"
         if not options.knows_tip:
             yield self._set_up_words()
+        if not options.tool and not named_at_start(program):
+            if lacks_length(options):
+                yield "no H word: the tool length that is active must be that of the tool"
+            elif takes_loaded_length(options):
+                yield "the length of the tool in the spindle is taken"
         yield f"coordinates in the {frame_name(program)} frame: the {offset} must hold it"
         if frame_name(program) == "part":
             yield f"its pose in the scan frame: {pose_words(program.T_scan_program)}"
@@ -196,13 +208,13 @@ class GCode(LinePostprocessor):
     def tool(self, number: int, text: str, *, first: bool) -> Iterator[str]:
         """Return a tool change, or tip control alone for the tool that is in the spindle."""
         if first:
-            yield from self._tip_on(self.options.tool)
+            yield from tip_on_words(self.options, self._turning(), self.options.tool)
             return
         # Tip control belongs to one tool: its length must not outlive the change.
-        yield from self._tip_off()
+        yield from tip_off_words(self.options)
         yield from (line.format(tool=number) for line in self._control.tool)
         yield from self.comments(text)
-        yield from self._tip_on(number)
+        yield from tip_on_words(self.options, self._turning(), number)
 
     def move_joint(self, moves: Moves) -> list[str]:
         """Return rapid blocks."""
@@ -237,8 +249,10 @@ class GCode(LinePostprocessor):
         yield self._control.stop
 
     def finish(self, program: Program) -> Iterator[str]:
-        """Return the end: tip control is switched off."""
-        yield from self._tip_off()
+        """Return the end: tip control is switched off, and feeds are per minute again."""
+        yield from tip_off_words(self.options)
+        if self.options.states_time:
+            yield "G94"
         yield from (line.format(name=self._listed_name(program)) for line in self._control.last)
 
     def targets(self, program: Program) -> FloatArray:
@@ -255,21 +269,6 @@ class GCode(LinePostprocessor):
     def assemble(self, lines: Iterable[str]) -> list[str]:
         """Return the lines with their block numbers."""
         return numbered(lines, self._control, self.options.line_numbers)
-
-    # --- words ---
-
-    def _tip_on(self, tool: int) -> Iterator[str]:
-        options, control = self.options, self._control
-        if control.length_on and tool:
-            yield control.length_on.format(tool=f" H{tool}")
-        # What a control with tip control would switch on, a program without it does itself.
-        lines = control.tip_on[options.words] if options.knows_tip else ()
-        for line in (options.tcp_on,) if options.tcp_on else lines:
-            yield line.replace("{tool}", f" H{tool}" if tool else "").strip()
-
-    def _tip_off(self) -> Iterator[str]:
-        options, control = self.options, self._control
-        yield from filter(None, (options.tcp_off or (control.tip_off if options.knows_tip else ""), control.length_off))
 
     def program_name(self, program: Program) -> str:
         """Return the name of the file, which is that of the program where it states one."""
