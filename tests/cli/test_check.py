@@ -43,7 +43,7 @@ def test_a_warning_is_told_and_may_run(run, program):
 def test_a_program_that_must_not_run(run, program):
     code, out, err = run("check", program("G49\nM30", "M30"), "--set", "check.line_length=50")
     assert (code, err) == (5, "sicp-cam: error: a.nc: must not run: 5 findings of level fail\n")
-    assert "  fail 870: a.nc, line 17: the line has 64 characters, more than 50" in out.splitlines()
+    assert "  fail 870: a.nc, line 17: the line has 65 characters, more than 50" in out.splitlines()
 
 
 def test_a_program_that_cannot_be_read(run, program):

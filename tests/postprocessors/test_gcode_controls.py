@@ -12,6 +12,9 @@ from sicp_cam.errors import JobError, PathError
 from sicp_cam.findings import Level
 from sicp_cam.model import Event, EventKind
 from sicp_postprocessors.gcode import GCode
+from sicp_postprocessors.gcode.forward import axes_of
+from sicp_postprocessors.gcode.machines import load_machine
+from sicp_postprocessors.gcode.ways import axis_deviations_deg
 
 NO_LENGTH = [{}, {"orientation": "rotary"}, {"dialect": "haas"}, PLAIN, {"tcp_on": "G43.5{tool}"}]
 OTHERS = [{"dialect": "siemens"}, {"dialect": "heidenhain"}, {"orientation": "rotary", "tcp_on": "M428"}]
@@ -169,12 +172,16 @@ class TestWaysOfAxes:
         c = np.array([row["C"] for row in turn.turn])
         assert degrees > 300 and np.isclose(degrees, np.abs(np.diff(c))[np.array(turn.rapid)[1:]].max(), atol=0.06)
 
-    def test_the_swing_of_a_full_turn_is_measured(self):
-        program = self.TURNS
-        findings = of_code(PLAIN | BACK, program, 627, "leaves the straight line")
-        (warning,) = findings
-        # The part lies about 103 mm off the axis of C and is carried right round: half way round it is twice that off.
-        assert float(re.search(r"up to ([0-9.]+) mm", warning.message)[1]) > 150.0
+    def test_the_swing_of_two_full_turns_is_measured(self):
+        # From the end of two turns back to their start: half way lies a full turn off, where the tip is in its place.
+        axes = np.vstack([leaning_axes(200, turn=4 * np.pi)] * 2)
+        tips = np.column_stack([np.linspace(0, 40, 400), np.zeros(400), np.zeros(400)])
+        program = program_of(path_of(tips, axes, 600.0, np.arange(400) % 200 == 0))
+        (turned,) = of_code(PLAIN | BACK, program, 627, "turns by up to")
+        assert "720.0 degrees" in turned.message and turned.where == "move 200, line 210"
+        (swung,) = of_code(PLAIN | BACK, program, 627, "leaves the straight line")
+        # The part lies about 110 mm off the axis of C: it is carried round, twice that far from its place.
+        assert 200.0 < float(re.search(r"up to ([0-9.]+) mm", swung.message)[1]) < 260.0
 
     def test_words_within_a_turn_are_no_rewind(self):
         options = {"dialect": "haas", "machine": "mixed-ac", "wrap": "0..360"}
@@ -192,6 +199,13 @@ class TestWaysOfAxes:
         assert np.isclose(float(re.search(r"up to ([0-9.]+) degrees", warning.message)[1]), exact, atol=0.006)
         assert not told({**options, "max_axis_step_deg": 5}, program, 622)
         assert not told({}, program, 622)
+
+    def test_small_turns_are_not_looked_at_because_they_cannot_leave_the_way(self):
+        machine, rng = load_machine("nutating-table-bc"), np.random.default_rng(2)
+        deg = rng.uniform(-180, 180, (4000, 2))
+        deg[1::2] = deg[::2] + rng.uniform(-1, 1, (2000, 2)) * [2.0, 4.0]
+        off = axis_deviations_deg(machine, deg, axes_of(machine, deg), np.arange(1, 4000, 2))
+        assert 0.03 < off.max() < 0.0786
 
     def test_a_machine_that_is_not_named_is_told(self):
         for options, taken in (({"kinematics": "BC"}, "head-bc"), ({}, "head-ac"), ({"dialect": "haas"}, "head-ac")):

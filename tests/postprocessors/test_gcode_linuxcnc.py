@@ -39,8 +39,11 @@ REMAP = M429 modalgroup=10 ngc=site429
 """
 
 
-def interpreted(program, folder, **options):
-    """Return the canonical calls of the interpreter, [(name, arguments)], for a program as it is written."""
+def interpreted(program, folder, loaded=0, **options):
+    """Return the canonical calls of the interpreter, [(name, arguments)], for a program as it is written.
+
+    A tool that is `loaded` is in the spindle before the program begins.
+    """
     files = GCode({"dialect": "linuxcnc", **options}).write(program)
     (folder / "tool.tbl").write_text("T1 P1 Z50 D6\nT3 P3 Z120.5 D6\n", "ascii")
     (folder / "all.var").write_text("", "ascii")
@@ -48,6 +51,8 @@ def interpreted(program, folder, **options):
     for file, content in files.items():
         (folder / file).write_bytes(content)
     main = folder / GCode({"dialect": "linuxcnc"}).main_file(files)
+    if loaded:
+        main.write_bytes(main.read_bytes().replace(b"%\n", b"%%\nT%d M6\n" % loaded, 1))
     command = ["rs274", "-g", "-v", folder / "all.var", "-t", folder / "tool.tbl"]
     for code in (428, 429):
         text = f"o<site{code}> sub\n(kinematics {code})\no<site{code}> endsub [1]\nM2\n"
@@ -111,6 +116,14 @@ def test_the_tool_length_is_on_while_the_tool_moves(tmp_path):
     calls = interpreted(simple_program(), tmp_path)
     offsets = [float(a.split()[2].rstrip(",")) for name, a in calls if name == "USE_TOOL_LENGTH_OFFSET"]
     assert offsets[0] == 0.0 and offsets[1] > 0.0 and offsets[-1] == 0.0
+
+
+@pytest.mark.parametrize(("loaded", "length"), [(0, 0.0), (1, 50.0), (3, 120.5)])
+def test_without_a_number_the_length_is_that_of_the_tool_in_the_spindle(tmp_path, loaded, length):
+    program = program_of(path_of(np.eye(3), leaning_axes(3), 600.0, np.arange(3) == 0))
+    calls = interpreted(program, tmp_path, loaded=loaded)
+    lengths = [float(a.split()[2].rstrip(",")) for name, a in calls if name == "USE_TOOL_LENGTH_OFFSET"]
+    assert lengths == [length, 0.0]
 
 
 def test_nasty_text_is_a_comment_and_does_nothing(tmp_path):

@@ -38,6 +38,8 @@ _ALLOWED_DEG = 2.0
 _OPPOSITE_DEG = 179.9
 _BENT_DEG = 0.1
 """How far the tool axis may leave the shortest way between two blocks before that is told."""
+_STRAIGHT_DEG = 6.0
+"""Axes that together turn by t radians take the tool off the shortest way by t^2 / 8 at most: here 0.08 degrees."""
 _REWIND_DEG = 90.0
 """A rapid move on which a rotary axis turns further than this is told."""
 
@@ -95,10 +97,11 @@ def _turn_findings(
     post: str, program: Program, options: GCodeOptions, setting: Setting, positions: Positions, angles: Angles
 ) -> Iterator[Finding]:
     deg, written = angles.deg, positions.program.path
-    turns = np.abs(rotary_turns_deg(setting.machine, deg)).max(axis=1, initial=0.0)
-    cuts = np.flatnonzero(~written.rapid & (np.arange(len(deg)) > 0))
+    both = np.abs(rotary_turns_deg(setting.machine, deg))
+    turns = both.max(axis=1, initial=0.0)
+    doubtful = np.flatnonzero(~written.rapid & (both.sum(axis=1) > _STRAIGHT_DEG))
     off = np.zeros(len(deg))
-    off[cuts] = axis_deviations_deg(setting.machine, deg, written.axes, cuts)
+    off[doubtful] = axis_deviations_deg(setting.machine, deg, written.axes, doubtful)
     turned_back = angles.forced & (off > _ALLOWED_DEG)
     yield from stretch_findings(
         program.path,

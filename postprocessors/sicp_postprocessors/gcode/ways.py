@@ -13,7 +13,9 @@ from sicp_postprocessors.orientations import axis_errors_deg
 __all__ = ["axis_deviations_deg", "rotary_turns_deg", "tip_deviations_mm"]
 
 _QUARTER_DEG = 60.0
-"""A move is looked at in four places and more, so that its axes turn by no more than a quarter of this between."""
+"""A move is looked at in quarters and finer, so that its axes turn by no more than a quarter of this between."""
+_SMALL_DEG = 3.01
+"""Where both axes turn less, the way is an arc whose middle is the furthest off, but for less than a hundredth."""
 
 
 def rotary_turns_deg(machine: Machine, deg: FloatArray) -> FloatArray:
@@ -62,12 +64,14 @@ def axis_deviations_deg(machine: Machine, deg: FloatArray, axes: FloatArray, mov
 def tip_deviations_mm(setting: Setting, deg: FloatArray, tips_mm: FloatArray) -> FloatArray:
     """Return how far the tip gets from its straight way on each move (n,) if all axes move evenly and no control helps.
 
-    It is measured at a quarter, half and three quarters of each move, and in more places where an axis turns far.
+    It is measured half way, where an axis turns further than `_SMALL_DEG` at each quarter, and in more places where one
+    turns far.
     """
     linear = setting.linear(deg, tips_mm)
     turns = rotary_turns_deg(setting.machine, deg)
     worst = np.zeros(len(deg))
-    places = 4 * np.maximum(np.ceil(np.abs(turns).max(axis=1, initial=0.0) / _QUARTER_DEG), 1.0).astype(np.int64)
+    furthest = np.abs(turns).max(axis=1, initial=0.0)
+    places = np.where(furthest <= _SMALL_DEG, 2, 4 * np.ceil(furthest / _QUARTER_DEG).astype(np.int64))
     places[:1] = 0
     for count in np.unique(places[places > 0]).tolist():
         moves = np.flatnonzero(places == count)
