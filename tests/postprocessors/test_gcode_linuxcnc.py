@@ -123,7 +123,8 @@ def test_without_a_number_the_length_is_that_of_the_tool_in_the_spindle(tmp_path
     program = program_of(path_of(np.eye(3), leaning_axes(3), 600.0, np.arange(3) == 0))
     calls = interpreted(program, tmp_path, loaded=loaded)
     lengths = [float(a.split()[2].rstrip(",")) for name, a in calls if name == "USE_TOOL_LENGTH_OFFSET"]
-    assert lengths == [length, 0.0]
+    # The interpreter alone, without the settings of a machine, takes its tool table to be in inches.
+    assert np.allclose(lengths, [25.4 * length, 0.0])
 
 
 def test_nasty_text_is_a_comment_and_does_nothing(tmp_path):
