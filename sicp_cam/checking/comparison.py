@@ -22,6 +22,9 @@ DIFFERS, DIFFERS_IN_SPEED = 897, 898
 
 _AXIS_ASSUMED = 303
 _SAME_FEED = 0.01
+_ASTRAY_DEG = 0.5
+"""How much longer added moves may make a turn of the tool axis: programs divided by rotary angles leave the great
+circle a little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +68,7 @@ def compared(
     far = np.linalg.norm(path.tips_mm[matched] - reference.tips_mm, axis=1)
     turned = angles_deg(path.axes[matched], reference.axes) if with_axes else None
     findings = list(_geometry(path, reference, matched, far, turned, file, (tolerance_mm, tolerance_deg)))
-    findings += _beside(path, matched, file, tolerance_mm)
+    findings += _added(path, matched, file, tolerance_mm, with_axes=with_axes)
     findings += _kinds(path, reference, matched, file)
     speed, told = _feeds(path, reference, matched, file)
     if not with_axes:
@@ -162,8 +165,8 @@ def _frame_hint(tips_mm: FloatArray, reference_mm: FloatArray, tolerance_mm: flo
     return f"; one rigid motion of {np.linalg.norm(T[:3, 3]):.4g} mm and {angle:.4g} degrees: are both in one frame?"
 
 
-def _beside(path: ToolPath, matched: IntArray, file: str, tolerance_mm: float) -> Iterator[Finding]:
-    """Find added moves that do not lie on the straight way between those of the reference."""
+def _added(path: ToolPath, matched: IntArray, file: str, tolerance_mm: float, *, with_axes: bool) -> Iterator[Finding]:
+    """Find added moves that are no part of a move of the reference: outside, beside its way, turned away, or rapid."""
     added = np.setdiff1d(np.arange(len(path)), matched)
     inside = added[(added > matched[0]) & (added < matched[-1])]
     outside = len(added) - len(inside)
@@ -174,15 +177,39 @@ def _beside(path: ToolPath, matched: IntArray, file: str, tolerance_mm: float) -
     if not len(inside):
         return
     after = np.searchsorted(matched, inside)
-    start, end = path.tips_mm[matched[after - 1]], path.tips_mm[matched[after]]
-    way, tip = end - start, path.tips_mm[inside]
-    square = np.maximum(np.sum(way * way, axis=1), 1e-30)
-    share = np.clip(np.sum((tip - start) * way, axis=1) / square, 0.0, 1.0)
-    off = np.linalg.norm(tip - start - share[:, None] * way, axis=1)
+    start, end = matched[after - 1], matched[after]
+    off = _beside_mm(path, start, inside, end)
     if off.max() > tolerance_mm:
         worst = int(off.argmax())
         what = f"an added move lies {off[worst]:.4g} mm beside the way of the reference"
         yield Finding(DIFFERS, Level.FAIL, what, place(path, int(inside[worst]), file))
+    astray = _astray_deg(path, start, inside, end)
+    if with_axes and astray.max() > _ASTRAY_DEG:
+        worst = int(astray.argmax())
+        what = f"the tool axis of an added move makes the turn of the reference {astray[worst]:.4g} degrees longer"
+        yield Finding(DIFFERS, Level.FAIL, what, place(path, int(inside[worst]), file))
+    hasty = path.rapid[inside] & ~path.rapid[end]
+    if hasty.any():
+        first = int(inside[hasty][0])
+        what = f"{int(hasty.sum())} added moves are rapid amid cuts of the reference"
+        yield Finding(DIFFERS, Level.FAIL, what, place(path, first, file))
+
+
+def _beside_mm(path: ToolPath, start: IntArray, inside: IntArray, end: IntArray) -> FloatArray:
+    """Return how far the tips of moves lie from the straight ways between those of two others."""
+    tips = path.tips_mm
+    way, along = tips[end] - tips[start], tips[inside] - tips[start]
+    square = np.maximum(np.sum(way * way, axis=1), 1e-30)
+    share = np.clip(np.sum(along * way, axis=1) / square, 0.0, 1.0)
+    off: FloatArray = np.linalg.norm(along - share[:, None] * way, axis=1)
+    return off
+
+
+def _astray_deg(path: ToolPath, start: IntArray, inside: IntArray, end: IntArray) -> FloatArray:
+    """Return how much longer the turn from one axis to another is by way of a third; 0 on the great circle."""
+    axes = path.axes
+    detour: FloatArray = angles_deg(axes[start], axes[inside]) + angles_deg(axes[inside], axes[end])
+    return detour - angles_deg(axes[start], axes[end])
 
 
 def _kinds(path: ToolPath, reference: ToolPath, matched: IntArray, file: str) -> Iterator[Finding]:

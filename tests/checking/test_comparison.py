@@ -108,6 +108,30 @@ def test_moves_may_be_added_on_the_way_and_not_beside_it():
     assert "lies 0.5 mm beside the way" in found.findings[0].message
 
 
+def test_the_axis_of_an_added_move_must_lie_between_those_of_the_reference():
+    made = divided(REFERENCE)
+    for angle, wrong in ((0.2, False), (1.0, True), (27.0, True)):
+        axes = made.axes.copy()
+        axes[10] = Rotation.from_rotvec(np.radians(angle) * np.array([0.0, 1.0, 0.0])).apply(axes[10])
+        found = compared(replace(made, axes=axes), REFERENCE, "a.nc")
+        assert failures(found) == ([(897, f"a.nc, move 10, line {made.lines[10]}")] if wrong else [])
+        if wrong:
+            assert "the tool axis of an added move makes the turn of the reference" in found.findings[0].message
+    flat = np.tile([0.0, 0.0, 1.0], (40, 1))
+    unstated = replace(REFERENCE, axes=flat, findings=(Finding(303, Level.WARN, "no tool axis"),))
+    assert failures(compared(replace(made, axes=axes), unstated, "a.nc")) == []
+
+
+def test_an_added_move_is_rapid_only_as_part_of_a_rapid_move():
+    made = divided(REFERENCE)
+    rapid = made.rapid.copy()
+    assert rapid[-3:].all()  # parts of the rapid move at the end
+    rapid[9:11] = True
+    found = compared(replace(made, rapid=rapid), REFERENCE, "a.nc")
+    assert failures(found) == [(897, f"a.nc, move 9, line {made.lines[9]}")]
+    assert found.findings[0].message == "2 added moves are rapid amid cuts of the reference"
+
+
 def test_a_move_that_is_missing_is_named():
     kept = np.delete(np.arange(40), 17)
     found = compared(moves(kept), REFERENCE, "a.nc")
