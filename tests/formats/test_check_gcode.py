@@ -117,8 +117,37 @@ BROKEN = [
     ("siemens", "TRAORI\n", "", 876, "fail", 7, "no word switches tip control on"),
     ("rotary", "G0 Z50.\nG49", "G49\nG1 C200.\nG0 Z50.", 876, "fail", 9, "C turns in a cut after tip control"),
     ("rotary", "G43.4 H1\nG0", "G0 A0. C0.\nG1 X1. A5. F100\nG43.4 H1\nG0", 876, "fail", 4, "before tip control"),
+    ("vector", "N90 M5", "N85 G49\nN90 G1 X50.", 876, "fail", 12, "while the tool axis of the last vector still holds"),
+    ("vector", "N90 M5", "N85 G43 H3\nN90 G1 X50.", 876, "fail", 12, "while the tool axis of the last vector"),
+    ("siemens", "M5\nTRAFOOF", "TRAFOOF\nG1 X9 Y9", 876, "fail", 12, "while the tool axis of the last vector"),
+    ("rotary", "G0 Z50.\nG49", "G49\nG1 X30.\nG0 Z50.", 876, "warn", 9, "while A11 C185 still hold"),
+    ("rotary", "G0 Z50.\nG49", "G43 H1\nG1 X30.\nG0 Z50.", 876, "warn", 9, "while A11 C185 still hold"),
+    (
+        "rotary",
+        "G43.4 H1\nG0 X0. Y0. Z50. A10. C170.",
+        "G0 X0. Y0. Z50. A10. C170.\nG43.4 H1",
+        876,
+        "warn",
+        3,
+        "rotary words beside X Y Z before tip control",
+    ),
+    ("rotary", "G43.4 H1\n", "G43.4\n", 876, "warn", 3, "G43.4 without H"),
+    ("rotary", "G49\nM30", "G49\nG53 G0 Z0.\nG1 X30.\nM30", 876, "warn", 11, "while A11 C185 still hold"),
+    ("vector", "G43.5 H3", "G43.5", 876, "warn", 5, "G43.5 without H"),
+    ("vector", "G43.5 H3", "G43.5 H4", 876, "info", 5, "H4 is taken for the tool T3"),
+    ("rotary", "G49\nG43.4 H1", "T1 M6\nG43.4 H1\nG49\nT2 M6\nG43.4", 876, "warn", 8, "no H since T2"),
+    (
+        "vector",
+        "X98. Y20. Z5.",
+        "X98 Y20. Z5.",
+        874,
+        "warn",
+        9,
+        "1 X word without a decimal point among those with one",
+    ),
+    ("rotary", "G0 X0. Y0. Z50. A10.", "G0 X0 Y0 Z50 A10", 874, "warn", 4, "1 A word without a decimal point"),
     ("rotary", "C185.", "C-175.", 877, "warn", 7, "C turns by 350 degrees in one block, from 175 to -175"),
-    ("arcs", "X10 Y0 I5 J0", "X10 Y0 I5.5 J0", 878, "fail", 4, "begins 5.5 and ends 4.5"),
+    ("arcs", "X10 Y0 I5 J0", "X10 Y0 I6 J0", 878, "fail", 4, "begins 6 and ends 4"),
     ("arcs", "X10 Y10 R5", "X10 Y10 R4", 878, "fail", 5, "R4 makes no arc"),
     ("arcs", "X10 Y10 R5", "X10 Y10", 878, "fail", 5, "neither R nor I J"),
     ("arcs", "I5 K0", "I7 K0", 878, "fail", 7, "begins 7 and ends 3"),
@@ -147,6 +176,56 @@ def test_a_defect_is_told_with_its_code_and_line(tmp_path, name, old, new, code,
     told = next((f.code, f.level.value, f.where) for f in found if words in f.message)
     assert told == (code, level, f"{tmp_path / 'a.nc'}, line {line}")
     assert {f.code for f in found} == {code}
+
+
+def test_what_is_positioned_or_turned_back_is_no_alarm(tmp_path):
+    head = "G43.4 H1\nG0 X0."
+    for old, new in (
+        (head, "G0 A10. C170.\nG43.4 H1\nG0 X0."),  # the rotary axes are set before, and nothing else
+        ("G49\nM30", "G49\nG0 A0. C360.\nG1 X5.\nM30"),
+        ("G49\nM30", "G49\nG53 G0 A0. C0.\nG1 X5.\nM30"),
+        ("G49\nM30", "G49\nG0 X5.\nM30"),
+        ("G49\nM30", "G49\nG53 G0 Z0.\nM30"),
+        (head, f"T1 M6\n{head}"),
+        (head, f"T7\n{head}"),  # chosen, not yet changed to
+    ):
+        assert ROTARY.count(old) == 1
+        assert findings_of(tmp_path, ROTARY.replace(old, new)) == ()
+
+
+def test_rotary_words_of_a_program_without_tip_control_are_told_only(tmp_path):
+    """So are programs on purpose whose X Y Z are those of the machine."""
+    (found,) = findings_of(tmp_path, ROTARY.replace("G43.4 H1", "G43 H1"))
+    assert (found.code, found.level, found.where[-6:]) == (876, Level.INFO, "line 5")
+    assert "no word switches tip control on: X Y Z must be those of the machine" in found.message
+
+
+def test_a_tool_may_be_changed_where_controls_know_its_length(tmp_path):
+    again = VECTOR.replace("N90 M5\n", "N85 G49\nN86 T4 M6\nN87 G43.5 H4\nN88 G1 X0. Y0. Z9. I0. J0. K1.\nN90 M5\n")
+    assert findings_of(tmp_path, again) == ()
+    found = findings_of(tmp_path, again.replace("H4", ""))
+    assert [(f.code, f.level, f.where[-7:]) for f in found] == [(876, Level.WARN, "line 14")]
+    bare = INVERSE.replace("G0 X0", "T1 M6\nG43\nG0 X0")  # LinuxCNC takes the length of the tool in the spindle
+    assert findings_of(tmp_path, bare) == ()
+    assert findings_of(tmp_path, INVERSE.replace("G0 X0", "T1 M6\nG0 X0")) == ()  # lengths are no matter of H here
+
+
+def test_a_text_of_two_bytes_a_character_is_no_program(tmp_path):
+    file = tmp_path / "a.nc"
+    for encoding, mark in (("utf-16-le", b"\xff\xfe"), ("utf-16-be", b"\xfe\xff")):
+        file.write_bytes(mark + VECTOR.encode(encoding))
+        (found,) = check(file)
+        assert (found.code, found.level) == (870, Level.FAIL)
+        assert "UTF-16, which no control reads; save it as ASCII" in found.message
+
+
+def test_missing_points_are_counted_where_they_matter(tmp_path):
+    text = ROTARY.replace("G0 Z50.", "G1 X40 Y0\nG1 X50 Y0\nG4 X2\nG0 Z50.")
+    (found,) = findings_of(tmp_path, text)
+    assert (found.code, found.level, found.where[-6:]) == (874, Level.WARN, "line 8")
+    assert found.message.startswith("2 X words without a decimal point among those with one, the first X40:")
+    assert findings_of(tmp_path, SIEMENS.replace("X0 Y0 Z0 A3", "X20 Y.5 Z0 A3").replace("Y3", "Y4")) == ()
+    assert findings_of(tmp_path, HEIDENHAIN.replace("X+20", "X+20.5")) == ()
 
 
 def test_inches_and_incremental_moves_are_followed(tmp_path):
@@ -185,7 +264,7 @@ def test_options_have_types_and_near_names(tmp_path):
 
 
 def test_long_programs_are_checked_in_seconds(tmp_path):
-    rows = "".join(f"N{i} G1 X{i}.5 Y{i % 7} Z5.1234 I0.1 J0.05 K0.99\n" for i in range(71, 100_000))
+    rows = "".join(f"N{i} G1 X{i}.5 Y{i % 7}. Z5.1234 I0.1 J0.05 K0.99\n" for i in range(71, 100_000))
     file = tmp_path / "a.nc"
     file.write_text(VECTOR.replace("N80 ", f"{rows}N100000 ").replace("N90 ", "").replace("N100 ", ""))
     start = time.perf_counter()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -49,8 +50,11 @@ def check(
     FormatError
         If the file is no text.
     """
-    lines = program_lines(path, read_bytes(path, limits), limits)
+    content = read_bytes(path, limits)
+    lines = program_lines(path, content, limits)
     defects = Defects(path)
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        defects.fail(FORM, "the text is UTF-16, which no control reads; save it as ASCII")
     _check_text(defects, lines, line_length)
     _check_percent(defects, lines)
     blocks = CheckedBlocks(defects, decimal_mark(lines), rotary_step_deg)

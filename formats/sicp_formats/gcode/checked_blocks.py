@@ -7,6 +7,8 @@ from collections import Counter
 
 from sicp_formats.gcode.checked_arcs import CheckedArcs
 from sicp_formats.gcode.checked_axis import CheckedAxis
+from sicp_formats.gcode.checked_length import CheckedLength
+from sicp_formats.gcode.checked_points import CheckedPoints
 from sicp_formats.gcode.codes import HOMING, MOTION, UNITS, heidenhain_text, refuse_codes
 from sicp_formats.gcode.machine import END_CODES
 from sicp_formats.gcode.plain import PLAIN
@@ -39,6 +41,7 @@ _GROUPS = tuple(
 )
 _GROUPS_M = (frozenset({0.0, 1.0, 2.0, 30.0}), frozenset({3.0, 4.0, 5.0}), frozenset({7.0, 9.0}), frozenset({8.0, 9.0}))
 _MOVING = ("X", "Y", "Z", "A", "B", "C", "A3", "B3", "C3")
+_COORDINATES = ("X", "Y", "Z", "A3", "B3", "C3", "I", "J", "K", "A", "B", "C")
 _NO_MOTION = "coordinates without a motion word before them (G0 to G3)"
 _NUMBERS_WRAP = 9000
 _SKIPPED = re.compile(r"[ \t]*/[0-9]?", re.ASCII)
@@ -65,6 +68,8 @@ class CheckedBlocks:
         self._decimal = decimal
         self._axis = CheckedAxis(defects, rotary_step_deg)
         self._arcs = CheckedArcs(defects)
+        self._length = CheckedLength(defects)
+        self._points = CheckedPoints(defects)
         self._heidenhain = False
         self._stated: set[str] = set()
         self._moved = False
@@ -104,6 +109,8 @@ class CheckedBlocks:
         if not self._ended:
             self._defects.warn(END, "the program has no end (M2 or M30); is the file complete?", last)
         self._axis.finish()
+        self._length.finish()
+        self._points.finish(no_matter=self._heidenhain)
 
     # --- blocks ---
 
@@ -120,6 +127,7 @@ class CheckedBlocks:
         points = i3 is not None or j3 is not None or k3 is not None or i is not None or j is not None or k is not None
         if not (turns or points or x is not None or y is not None or z is not None):
             return
+        self._points.take(zip(_COORDINATES, words[2:], strict=False), line)
         if not self._moved:
             self._first_move(line)
         if self._mode is None:
@@ -129,11 +137,13 @@ class CheckedBlocks:
         else:
             self._arcs.straight(x, y, z, self._absolute)
             if points:
-                self._axis.point(i3 is not None or j3 is not None or k3 is not None, line)
+                siemens = i3 is not None or j3 is not None or k3 is not None
+                self._axis.point(siemens, (i3, j3) if siemens else (i, j), line)
+        if turns:
+            beside = x is not None or y is not None or z is not None
+            self._turn({"A": a, "B": b, "C": c}, line, beside=beside)
         if self._mode:
             self._cut(f is not None, line)
-        if turns:
-            self._axis.turn({"A": a, "B": b, "C": c}, absolute=self._absolute, cuts=bool(self._mode), line=line)
 
     def _block(self, block: Block, line: int) -> bool:
         if number := block.words.get("N"):
@@ -151,7 +161,8 @@ class CheckedBlocks:
         )
         if homing or any(code in (10.0, 52.0, 92.0) for code in block.g) or block.manners:
             self._arcs.forget()
-            self._axis.forget()
+            if any(letter in block.words for letter in "ABC") or not any(letter in block.words for letter in "XYZ"):
+                self._axis.forget()
         elif moving and not dwells:
             self._move(block, line)
         return self._end(block, line)
@@ -166,14 +177,18 @@ class CheckedBlocks:
         if (self._mode or 0.0) < 2.0:
             siemens = any(letter in words for letter in ("A3", "B3", "C3"))
             if siemens or any(letter in words for letter in "IJK"):
-                self._axis.point(siemens, line)
+                sideways = ("A3", "B3") if siemens else ("I", "J")
+                self._axis.point(siemens, (words.get(sideways[0]), words.get(sideways[1])), line)
         elif "plane" not in self._stated:
             self._stated.add("plane")
             self._defects.warn(MODES, "an arc before its plane is stated (G17, G18 or G19)", line)
+        beside = any(letter in words for letter in "XYZ")
+        self._turn({letter: words.get(letter) for letter in "ABC"}, line, beside=beside)
         if self._mode:
             self._cut("F" in words, line)
-        angles = {letter: words.get(letter) for letter in "ABC"}
-        self._axis.turn(angles, absolute=self._absolute, cuts=bool(self._mode), line=line)
+
+    def _turn(self, angles: dict[str, str | None], line: int, *, beside: bool) -> None:
+        self._axis.turn(angles, absolute=self._absolute, cuts=bool(self._mode), beside=beside, line=line)
 
     def _end(self, block: Block, line: int) -> bool:
         if not any(code in END_CODES for code in block.m):
@@ -203,6 +218,8 @@ class CheckedBlocks:
                 self._feed_known = self._feed_known and (code == 93.0) == self._inverse_time
                 self._inverse_time = code == 93.0
         self._axis.take_modes(block, line)
+        self._length.take(block, line)
+        self._points.take_block(block, line)
 
     def _first_move(self, line: int) -> None:
         self._moved = True
@@ -245,6 +262,9 @@ class CheckedBlocks:
             self._defects.fail(FEED, f"F{text}: a feed must be more than 0", line)
 
     def _cut(self, has_feed: bool, line: int) -> None:
+        self._axis.cut(line)
+        if self._length.missing:
+            self._length.cut(line)
         if self._inverse_time and not has_feed:
             self._defects.fail(FEED, "a cut under inverse time (G93) without F in its own block", line)
         elif not self._feed_known:
