@@ -1,7 +1,7 @@
 """What robots have in common whose programs are plain text: signals, payload, speeds, poses in their own angles, parts.
 
 Codes: 670 payload not given, 671 tool or frame must be on the controller, 672 corners are rounded by speed and not by
-distance, 673 speed beyond what the language takes, 674 speed rounded.
+distance, 673 speed beyond what the language takes, 674 speed rounded, 675 analog value too large.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ import dataclasses
 import re
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
 from sicp_cam.errors import printable
 from sicp_cam.findings import Finding, Level
-from sicp_cam.model import FloatArray, Program, ToolPath
+from sicp_cam.model import EventKind, FloatArray, Program, ToolPath
 from sicp_cam.ranges import Between
 from sicp_postprocessors.base import failures
-from sicp_postprocessors.checks import frame_findings, stretch_findings
+from sicp_postprocessors.checks import event_place, frame_findings, stretch_findings
 from sicp_postprocessors.moves import tools_in_use
 from sicp_postprocessors.numbers import trimmed
 from sicp_postprocessors.options import THIS_POST, flag
@@ -37,6 +37,7 @@ Payload = tuple[float, float, float, float]
 
 _SHORT_NAME = 16
 _HEAVIEST_KG = 1000.0
+_OF_THE_FIRST_POINT = ("status", "turn", "configuration")
 _WHOLE_TEST = 1000
 """More moves than a self-test has: it is never divided."""
 
@@ -115,6 +116,10 @@ class ControllerPostprocessor(RobotPostprocessor):
     """How positions and orientations are written, in words for the head."""
     largest_mm_s: ClassVar[float] = np.inf
     """Speed that the language takes at most."""
+    smallest_mm_s: ClassVar[float] = 1e-3
+    """Speed below which its words would round the feed away."""
+    largest_analog: ClassVar[float] = np.inf
+    """Value that an analog output takes at most."""
 
     @abstractmethod
     def program_files(self, program: Program, name: str) -> dict[str, bytes]:
@@ -172,8 +177,16 @@ class ControllerPostprocessor(RobotPostprocessor):
 
     def _for_test(self) -> ControllerPostprocessor:
         post = type(self)()
+        # What was said of the arm at the first point of the path does not hold here.
+        defaults: dict[str, Any] = {field.name: field.default for field in dataclasses.fields(self.options)}
+        forgotten = {name: defaults[name] for name in _OF_THE_FIRST_POINT if name in defaults}
         post.options = dataclasses.replace(
-            self.options, self_test="off", first_run=True, max_moves_per_program=_WHOLE_TEST
+            self.options,
+            self_test="off",
+            first_run=True,
+            spin="transport",
+            max_moves_per_program=_WHOLE_TEST,
+            **forgotten,
         )
         return post
 
@@ -206,6 +219,7 @@ class ControllerPostprocessor(RobotPostprocessor):
         if failures(findings):
             return findings
         findings += [*self._speed_findings(program.path), *self._payload_findings()]
+        findings += [*self._analog_findings(program.path), *self._self_test_findings(program)]
         if self.cell_on_controller():
             remedy = "the controller has the scan frame only: run with --frame scan, or give the cell"
             findings += frame_findings(program, Level.FAIL, remedy)
@@ -215,9 +229,34 @@ class ControllerPostprocessor(RobotPostprocessor):
         too_fast = self.feeds_mm_min(path) > self.largest_mm_s * 60.0
         message = f"the speed is beyond the {self.largest_mm_s:g} mm/s that the controller takes; lower the feed"
         words = f"lower it with {flag(self.name, 'rapid_mm_s', f'{self.largest_mm_s:g}')}"
+        too_slow = ~path.rapid & (path.feeds_mm_min < self.smallest_mm_s * 60.0)
+        slow = f"the speed is below {self.smallest_mm_s:g} mm/s, and would be rounded away; raise the feed"
         return [
+            *stretch_findings(path, too_slow, 673, Level.FAIL, slow),
             *stretch_findings(path, too_fast & ~path.rapid, 673, Level.FAIL, message),
             *stretch_findings(path, too_fast & path.rapid, 673, Level.FAIL, message.replace("lower the feed", words)),
+        ]
+
+    def _self_test_findings(self, program: Program) -> list[Finding]:
+        """Return what forbids the self-test, which is judged like any program."""
+        options = self.options
+        if options.self_test == "off":
+            return []
+        test = self_test_program(program, "self-test", options.self_test, options.self_test_step_mm)
+        found = self._for_test().preflight(test)
+        return [replace(f, message=f"self-test: {f.message}") for f in found if f.level is Level.FAIL]
+
+    def _analog_findings(self, path: ToolPath) -> list[Finding]:
+        options = self.options
+        if options.spindle_speed != "aio":
+            return []
+        message = f"the spindle speed is a value beyond the {self.largest_analog:g} that the analog output takes; mend "
+        words = message + flag(self.name, "spindle_speed_scale", "VALUE")
+        scale = options.spindle_speed_scale or 0.0
+        return [
+            Finding(675, Level.FAIL, words, event_place(event))
+            for event in path.events
+            if event.kind is EventKind.SPINDLE and abs(event.value) * scale > self.largest_analog
         ]
 
     def _payload_findings(self) -> list[Finding]:

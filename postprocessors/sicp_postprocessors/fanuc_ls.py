@@ -110,6 +110,11 @@ class FanucLs(ControllerPostprocessor):
         yield f"  UFRAME_NUM={self.options.uframe} ;"
         yield f"  UTOOL_NUM={self.options.utool} ;"
 
+    def zones_mm(self, path: ToolPath) -> FloatArray:
+        """Return the zones: CD counts whole millimetres."""
+        zones = ControllerPostprocessor.zones_mm(self, path)
+        return zones if self.options.rounding == "CNT" else np.floor(zones)
+
     def targets(self, program: Program) -> FloatArray:
         """Return the number of each move's position in its program, and W, P, R in degrees."""
         numbers = np.concatenate([np.arange(len(part)) for part in self.parts(program.path)])
@@ -118,7 +123,7 @@ class FanucLs(ControllerPostprocessor):
 
     def move_joint(self, moves: Moves) -> list[str]:
         """Return the move to the first point, axis by axis."""
-        percent = max(1, min(100, int(self.options.approach_percent)))
+        percent = max(1, min(100, int(self.options.joint_percent)))
         return rows(f"J P[{{:d}}] {percent}% FINE    ;", moves.targets[:, 0])
 
     def move_linear(self, moves: Moves) -> list[str]:

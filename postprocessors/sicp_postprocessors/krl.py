@@ -66,8 +66,8 @@ class KrlOptions(ControllerOptions):
     """Acceleration along the path ($ACC.CP); the controller's own if left out."""
     advance: Annotated[int, Between(1, 5)] = 5
     """Moves that the interpreter runs ahead of the arm ($ADVANCE)."""
-    split: Literal["files", "subprograms"] = "files"
-    """Parts of a long path as files NAME_001.src ..., or as subprograms of the one file."""
+    split: Literal["subprograms", "files"] = "subprograms"
+    """Parts of a long path as subprograms of the one file, or as files NAME_001.src ... with data that are GLOBAL."""
     angle_decimals: Annotated[int, Between(3, 7)] = 5
     """Decimals of angles in degrees."""
 
@@ -109,6 +109,7 @@ class Krl(ControllerPostprocessor):
     convention = "mm and degrees, R = Rz(A) Ry(B) Rx(C)"
     reserved = frozenset(_RESERVED.split())
     largest_mm_s = 3000.0
+    largest_analog = 1.0
     modal_speed = True
     modal_zone = True
 
@@ -142,7 +143,7 @@ class Krl(ControllerPostprocessor):
         """Initialise motion, and state everything that the path relies on."""
         options = self.options
         yield from _INI
-        yield f"BAS (#VEL_PTP,{trimmed(options.approach_percent, 1)})"
+        yield f"BAS (#VEL_PTP,{trimmed(options.joint_percent, 1)})"
         yield f"$ADVANCE={options.advance}"
         yield "$ORI_TYPE=#VAR"
         yield f"$VEL.ORI1={trimmed(options.rotation_deg_s, 3)}"
@@ -225,16 +226,19 @@ class Krl(ControllerPostprocessor):
 
     def _data(self, program: Program, name: str) -> list[str]:
         options = self.options
+        # Parts in files of their own see the data of this one only where they are global.
+        in_files = options.split == "files" and len(self.parts(program.path)) > 1
+        declared = "DECL GLOBAL" if in_files else "DECL"
         lines = [*_HEAD, f"DEFDAT {name} PUBLIC", "EXT BAS (BAS_COMMAND :IN,REAL :IN )", "DECL INT SUCCESS"]
         if options.base_number is None:
-            lines += [f"DECL FRAME PART_BASE={_frame(self.pose_in_world(program))}"]
+            lines += [f"{declared} FRAME PART_BASE={_frame(self.pose_in_world(program))}"]
         if options.tool_number is None:
             tools = dict.fromkeys(map(_tool_name, _tools_told(program.path)))
-            lines += [f"DECL FRAME {tool}={_frame(self.tool_in_flange())}" for tool in tools]
+            lines += [f"{declared} FRAME {tool}={_frame(self.tool_in_flange())}" for tool in tools]
         if options.payload is not None:
             mass, *centre = options.payload
             place = labelled((*centre, 0.0, 0.0, 0.0), "XYZABC")
-            lines += [f"DECL LOAD PART_LOAD={{M {trimmed(mass, 3)},CM {{{place}}},J {{X 0,Y 0,Z 0}}}}"]
+            lines += [f"{declared} LOAD PART_LOAD={{M {trimmed(mass, 3)},CM {{{place}}},J {{X 0,Y 0,Z 0}}}}"]
         return [*lines, "ENDDAT"]
 
 

@@ -157,7 +157,7 @@ class Rapid(ControllerPostprocessor):
             frames = f"{_pose(self.pose_of_six(options.cell or ZERO))},{_pose(program.T_scan_program)}"
             yield f'PERS wobjdata wPart:=[FALSE,TRUE,"",{frames}];'
         rapid = min(options.rapid_mm_s, options.fastest_mm_s)
-        start = min(rapid, self.largest_mm_s * options.approach_percent / 100.0)
+        start = min(rapid, self.largest_mm_s * options.joint_percent / 100.0)
         yield f"CONST speeddata vStart:={self._speed(start)};"
         if path.rapid[1:].any():
             yield f"CONST speeddata vRapid:={self._speed(rapid)};"

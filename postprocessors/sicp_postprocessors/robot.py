@@ -7,7 +7,7 @@ ahead of the arm, so every output waits until the arm has come to rest.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -90,7 +90,7 @@ class RobotPostprocessor(LinePostprocessor):
         if rev_min:
             sense = "counter-clockwise" if rev_min < 0 else "clockwise"
             yield from self.comments(f"spindle {trimmed(abs(rev_min), 3)} rev/min {sense}")
-            yield from self.spindle_speed(abs(rev_min))
+        yield from self.spindle_speed(abs(rev_min))
         wanted, other = (counter, clockwise) if rev_min < 0 else (clockwise, counter)
         for signal, on in ((other, False), (wanted, rev_min != 0.0)):
             if signal:
@@ -161,7 +161,8 @@ class RobotPostprocessor(LinePostprocessor):
     def events(self, program: Program) -> list[Event]:
         """Return the events as the program tells them, with what a person must do in its place.
 
-        A tool change by hand needs the spindle off before it, and a stop behind it. A spindle that no output starts is
+        A tool change by hand needs spindle and coolant off before it, and a stop behind it; then the coolant goes on.
+        A spindle that no output starts is
         started by the operator, for whom the program stops; what no output switches off is told in a comment. Nor does
         the arm move before the operator has seen that tool or cell are not those of the robot.
         """
@@ -174,19 +175,30 @@ class RobotPostprocessor(LinePostprocessor):
 
     def _with_tool_changes(self, program: Program) -> list[Event]:
         told: list[Event] = []
-        runs = False
+        running = dict.fromkeys((EventKind.SPINDLE, EventKind.COOLANT), 0.0)
         for event in events_in_order(program.path):
-            by_hand = changes_tool_by_hand(event)
-            if by_hand and runs:
-                told.append(Event(event.before_move, EventKind.SPINDLE, 0.0, "", event.line))
-                runs = False
-            told.append(event)
-            if by_hand:
-                text = f"tool {int(event.value)} {event.text}".strip()
-                told.append(Event(event.before_move, EventKind.STOP, 0.0, text, event.line))
-            elif event.kind is EventKind.SPINDLE:
-                runs = event.value != 0.0
+            if changes_tool_by_hand(event):
+                told += self._tool_change(event, running)
+                running[EventKind.SPINDLE] = 0.0
+            else:
+                told.append(event)
+            if event.kind in running:
+                running[event.kind] = event.value
         return told
+
+    def _tool_change(self, event: Event, running: Mapping[EventKind, float]) -> list[Event]:
+        """Return a tool change between what must be off for it and what goes on behind it."""
+        off = [kind for kind, value in running.items() if value]
+        by_hand = EventKind.SPINDLE in off and not any(self.spindle_signals()) and not self._commands_speed()
+        text = f"{'spindle off, ' if by_hand else ''}tool {int(event.value)} {event.text}".strip()
+        back = [(EventKind.COOLANT, 1.0, "")] if EventKind.COOLANT in off else []
+        told = [
+            *((kind, 0.0, "") for kind in off),
+            (EventKind.TOOL, event.value, event.text),
+            (EventKind.STOP, 0.0, text),
+            *back,
+        ]
+        return [Event(event.before_move, kind, value, words, event.line) for kind, value, words in told]
 
     def stops_spindle(self, event: Event) -> bool:
         """Say that a tool is changed by hand once the path has begun, and with the spindle off."""
@@ -280,7 +292,7 @@ class RobotPostprocessor(LinePostprocessor):
             reach, off = trimmed(options.blend_mm, 6), trimmed(options.blend_corner_mm, 6)
             yield f"points between cuts are blended: within {reach} mm, corners cut by {off} mm at most"
         if options.first_run:
-            yield f"first run: no blending, no move faster than {trimmed(options.first_run_mm_s, 3)} mm/s"
+            yield f"first run: no blending, no straight move faster than {trimmed(options.first_run_mm_s, 3)} mm/s"
 
     def frame_remark(self, program: Program, named: str = "the program frame") -> str:
         """Return what the program's frame is the pose of: the scan frame, or the part in it."""

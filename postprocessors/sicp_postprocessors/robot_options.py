@@ -13,6 +13,7 @@ from sicp_postprocessors.orientations import Six
 
 __all__ = ["RobotOptions", "Six", "output_words"]
 
+_FIRST_RUN_PERCENT = 1.0
 _SWITCH = re.compile(r"\s*(\S.*?)\s*=\s*([^=:\s]+)\s*:\s*(on|off)\s*", re.IGNORECASE)
 
 
@@ -31,7 +32,7 @@ class RobotOptions(ArmOptions):
     approach_percent: Annotated[float, Between(0.1, 100.0)] = 10.0
     """Joint speed of the move to the first point, of what the robot can do."""
     rapid_mm_s: Annotated[float, Between(0.1, 10_000.0)] = 250.0
-    """Tip speed of rapid moves, which are straight, and the most that the move to the first point may reach."""
+    """Tip speed of rapid moves, which are straight."""
     blend: bool = True
     """Round the points between two cutting moves; false: come to rest at every point."""
     blend_mm: Annotated[float, Between(0.001, 1000.0)] = 0.5
@@ -39,9 +40,9 @@ class RobotOptions(ArmOptions):
     blend_corner_mm: Annotated[float, Between(0.001, 1000.0)] = 0.05
     """How far rounding may cut a corner, at most: where the path turns sharply, it begins later for that."""
     first_run: bool = False
-    """Write a program for the first run: no rounding, and no move faster than `first_run_mm_s`."""
+    """Write a program for the first run: no rounding, no straight move above `first_run_mm_s`, a slow approach."""
     first_run_mm_s: Annotated[float, Between(0.1, 250.0)] = 50.0
-    """Speed that no move of a first run exceeds."""
+    """Speed that no straight move of a first run exceeds; the joint speed of its approach is at most 1 percent."""
     spindle_output: str = ""
     """Digital output that starts the spindle clockwise, as the controller names or numbers it."""
     spindle_ccw_output: str = ""
@@ -55,7 +56,7 @@ class RobotOptions(ArmOptions):
     max_moves_per_program: Annotated[int, Between(1, 1_000_000)] = 2000
     """Longer paths are divided into programs at rapid moves; what a controller takes depends on its memory."""
     split_cuts: bool = False
-    """True divides a cut that is longer than that too; the robot then comes to rest within the cut."""
+    """True divides a cut that is longer than that too, within the cut."""
 
     def __post_init__(self) -> None:
         if problems := self.problems():
@@ -79,6 +80,11 @@ class RobotOptions(ArmOptions):
     def blends(self) -> bool:
         """Whether points between cutting moves are rounded."""
         return self.blend and not self.first_run
+
+    @property
+    def joint_percent(self) -> float:
+        """Joint speed of the move to the first point: a first run creeps, wherever the arm then stands."""
+        return min(self.approach_percent, _FIRST_RUN_PERCENT) if self.first_run else self.approach_percent
 
     @property
     def fastest_mm_s(self) -> float:

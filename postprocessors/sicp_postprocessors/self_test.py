@@ -1,7 +1,8 @@
 """A short program that shows by eye whether tool, frame and orientation are what the controller thinks they are.
 
-It moves the tip to a known place and along X and Y of the program frame, and then leans the tool about its tip; before
-each step it stops and says what the operator must see. It is meant for manual mode at low speed.
+It moves the tip to a known place and along the two axes of the program frame that lie across the tool, and then leans
+the tool about its tip; before the first move and after each one it stops and asks what the operator sees. No step goes
+towards the part. It is meant for manual mode at low speed.
 """
 
 from __future__ import annotations
@@ -30,27 +31,31 @@ def self_test_program(program: Program, name: str, where: str, step_mm: float) -
     name
         Name of the self-test.
     where
-        ``origin``: above the origin of the program frame by the step; ``start``: at the first point of the path.
+        ``origin``: off the origin of the program frame, along its Z; ``start``: off the first point of the path, along
+        the tool; by one step.
     step_mm
-        Length of each step along X and Y.
+        Length of each step.
     """
     path = program.path
     at_start = where == "start"
-    place = "the first point of the path" if at_start else f"{step_mm:g} mm above the origin of the frame, along its Z"
-    centre = path.tips_mm[0] if at_start else np.array([0.0, 0.0, step_mm])
     axis = path.axes[0] if at_start else np.array(_UPRIGHT)
+    # Away from the part, along the tool: no step goes towards it.
+    centre = (path.tips_mm[0] if at_start else np.zeros(3)) + step_mm * axis
+    place = f"{step_mm:g} mm off the {'first point' if at_start else 'origin'}, along the tool"
+    (u, towards_u), (v, towards_v) = _across(axis)
     steps = [
-        (centre, axis, f"the tip is at {place}"),
-        (centre + step_mm * np.eye(3)[0], axis, f"the tip has moved {step_mm:g} mm along +X of the frame"),
-        (centre, axis, "the tip is back"),
-        (centre + step_mm * np.eye(3)[1], axis, f"the tip has moved {step_mm:g} mm along +Y of the frame"),
-        (centre, axis, "the tip is back"),
-        (centre, _leaning(axis, 0), f"the holder leans {LEAN_DEG:g} degrees towards +X, the tip has not moved"),
-        (centre, axis, "the holder is back"),
-        (centre, _leaning(axis, 1), f"the holder leans {LEAN_DEG:g} degrees towards +Y, the tip has not moved"),
-        (centre, axis, "the holder is back"),
+        (centre, axis, f"{place}?"),
+        (centre + step_mm * u, axis, f"moved {step_mm:g} mm to {towards_u}?"),
+        (centre, axis, "back?"),
+        (centre + step_mm * v, axis, f"moved {step_mm:g} mm to {towards_v}?"),
+        (centre, axis, "back?"),
+        (centre, _leaning(axis, u), f"leans {LEAN_DEG:g} deg to {towards_u}, tip stays?"),
+        (centre, axis, "back?"),
+        (centre, _leaning(axis, v), f"leans {LEAN_DEG:g} deg to {towards_v}, tip stays?"),
+        (centre, axis, "back?"),
     ]
-    events = tuple(Event(after, EventKind.STOP, 0.0, f"see that {told}") for after, (_, _, told) in enumerate(steps, 1))
+    first = Event(0, EventKind.STOP, 0.0, f"goes {place}")
+    events = (first, *(Event(after, EventKind.STOP, 0.0, told) for after, (_, _, told) in enumerate(steps, 1)))
     tips, axes = np.array([tip for tip, _, _ in steps]), np.array([axis for _, axis, _ in steps])
     count = len(steps)
     rapid = np.arange(count) == 0
@@ -66,12 +71,18 @@ def self_test_program(program: Program, name: str, where: str, step_mm: float) -
     )
 
 
-def _leaning(axis: FloatArray, towards: int) -> FloatArray:
-    """Return a tool axis turned towards an axis of the frame, or away from it where it lies along that one."""
-    goal = np.eye(3)[towards]
-    side = goal - (goal @ axis) * axis
-    if np.linalg.norm(side) < 1e-6:
-        side = np.eye(3)[2] - axis[2] * axis
+def _across(axis: FloatArray) -> list[tuple[FloatArray, str]]:
+    """Return the two axes of the frame that lie most across a tool axis, made square to it, with their names."""
+    across = sorted(range(3), key=lambda k: abs(float(axis[k])))[:2]
+    directions = []
+    for k in sorted(across):
+        side = np.eye(3)[k] - axis[k] * axis
+        directions.append((side / np.linalg.norm(side), f"+{'XYZ'[k]}"))
+    return directions
+
+
+def _leaning(axis: FloatArray, side: FloatArray) -> FloatArray:
+    """Return a tool axis turned towards a direction across it."""
     lean = np.radians(LEAN_DEG)
-    leaned: FloatArray = np.cos(lean) * axis + np.sin(lean) * side / np.linalg.norm(side)
+    leaned: FloatArray = np.cos(lean) * axis + np.sin(lean) * side
     return leaned

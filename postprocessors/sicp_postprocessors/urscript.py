@@ -98,6 +98,8 @@ class UrScript(ControllerPostprocessor):
     summary = "Universal Robots script NAME.script, long paths in functions"
     Options = UrScriptOptions
     options: UrScriptOptions
+    largest_mm_s = 5000.0
+    largest_analog = 1.0
     suffix = ".script"
     longest_name = 40
     reserved = frozenset(_RESERVED.split())
@@ -162,7 +164,7 @@ class UrScript(ControllerPostprocessor):
     def move_joint(self, moves: Moves) -> list[str]:
         """Return the move to the first point, joint by joint."""
         options = self.options
-        speed = trimmed(options.approach_percent / 100.0 * _JOINT_RAD_S, 4)
+        speed = trimmed(options.joint_percent / 100.0 * _JOINT_RAD_S, 4)
         return rows(f"movej({self._point()}, a={trimmed(options.joint_accel_rad_s2, 4)}, v={speed})", *moves.targets.T)
 
     def move_linear(self, moves: Moves) -> list[str]:

@@ -78,7 +78,7 @@ def read_krl(files, name):
         assert lines[:2] == ["&ACCESS RVP", "&REL 1"]
         if file.endswith(".dat"):
             assert re.fullmatch(r"DEFDAT \w+ PUBLIC", lines[2]) and lines[-1] == "ENDDAT"
-            found = [re.fullmatch(r"DECL FRAME (\w+)=\{(.*)\}", line) for line in lines]
+            found = [re.fullmatch(r"DECL (?:GLOBAL )?FRAME (\w+)=\{(.*)\}", line) for line in lines]
             frames |= {match[1]: krl_frame(match[2]) for match in found if match}
             continue
         at = 2

@@ -88,7 +88,9 @@ CASES = {
     "gcode-siemens-nasty": lambda: GCode({"orientation": "siemens"}).write(nasty_program()),
     "krl": lambda: Krl().write(simple_program()),
     "krl-parts": lambda: Krl(
-        PARTS | {"spindle_output": "1", "coolant_output": "2", "outputs": "INSERT/X=7:on", "payload": "8.5,0,2,90"}
+        PARTS
+        | {"spindle_output": "1", "coolant_output": "2", "outputs": "INSERT/X=7:on", "payload": "8.5,0,2,90"}
+        | {"split": "files"}
     ).write(simple_program(T_scan_program=POSE)),
     "krl-subprograms": lambda: Krl(
         {"max_moves_per_program": "3", "split_cuts": "true", "split": "subprograms", "tool_number": 2, "base_number": 1}

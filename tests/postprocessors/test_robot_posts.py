@@ -454,17 +454,83 @@ def test_the_self_test_shows_frame_and_tool(post, where):
     tested = {name: content for name, content in files.items() if "_test" in name.lower()}
     assert set(files) - set(tested) == set(post({**GIVEN, **more}).write(program))
     again = READ[post.name](tested)
-    centre = np.array([0, 0, 40]) if where == "origin" else program.path.tips_mm[0]
-    assert np.allclose(again.tips - centre, [[0, 0, 0], [40, 0, 0], [0, 0, 0], [0, 40, 0], *[[0, 0, 0]] * 5], atol=1e-3)
     axes, upright = np.array(again.axes), np.array([0, 0, 1]) if where == "origin" else program.path.axes[0]
+    begin = np.zeros(3) if where == "origin" else program.path.tips_mm[0]
+    steps = np.array(again.tips) - begin - 40.0 * upright
+    assert np.allclose(steps[[0, 2, 4, 5, 6, 7, 8]], 0.0, atol=1e-3)
+    # Square to the tool, so that no step goes towards the part.
+    assert np.allclose(np.linalg.norm(steps[[1, 3]], axis=1), 40.0, atol=1e-3)
+    assert np.allclose(steps @ upright, 0.0, atol=1e-3) and steps[1, 0] > 30.0 and steps[3, 1] > 30.0
     assert np.allclose(axes[[0, 1, 2, 3, 4, 6, 8]], upright, atol=1e-6)
     assert np.degrees(np.arccos(axes[[5, 7]] @ upright)) == pytest.approx([15.0, 15.0], abs=1e-3)
     assert axes[5, 0] > upright[0] + 0.1 and axes[7, 1] > upright[1] + 0.1
-    assert [kind for kind, _ in again.actions].count("stop") == 9
+    assert [kind for kind, _ in again.actions].count("stop") == 10
+    kinds = [kind for kind, _ in again.actions if kind in ("stop", "PTP", "MoveJ", "J", "movej")]
+    assert kinds[0] == "stop"
     assert max(again.feeds) <= 3000 and np.allclose(again.frame, pose_from_six(CELL) @ POSE, atol=1e-4)
     assert np.allclose(again.tool, pose_from_six(TOOL), atol=1e-4)
     text = b"".join(tested.values()).decode()
     assert "not a safety function" in text and "self-test: manual mode" in text
+
+
+@pytest.mark.parametrize("axis", [[-1.0, 0, 0], [0, 1, 0], [0, 0, -1], [0.6, 0, 0.8]])
+def test_the_self_test_never_steps_towards_the_part(axis):
+    path = path_of([[0, 0, 0], [10, 0, 0]], [axis] * 2, [0, 600], [True, False])
+    again = run_test(Krl(GIVEN | {"self_test": "start", "status": 2, "turn": 35}), program_of(path))
+    assert np.allclose(np.array(again.tips) @ axis, 50.0, atol=1e-3)
+    assert np.degrees(np.arccos(np.array(again.axes) @ axis)).max() == pytest.approx(15.0, abs=1e-3)
+
+
+def test_the_self_test_is_judged_like_a_program():
+    program, box = simple_program(), {"work_box_mm": "-600,-600,-600,600,600,600"}
+    near = {"tool": TOOL, "cell": "0,0,0,0,0,0"}
+    assert not [f for f in Krl(near | box).preflight(program) if f.level is Level.FAIL]
+    made = Krl(near | box | {"self_test": "origin", "self_test_step_mm": 500})
+    assert not [f for f in made.preflight(program) if f.level is Level.FAIL]
+    narrow = {"work_box_mm": "50,-600,-600,600,600,600"}
+    (failed,) = [f for f in Krl(near | narrow | {"self_test": "origin"}).preflight(program) if f.level is Level.FAIL][
+        :1
+    ]
+    assert failed.message.startswith("self-test: ")
+
+
+def run_test(made, program):
+    files = made.write(program)
+    return READ[made.name]({name: content for name, content in files.items() if "_test" in name.lower()})
+
+
+@EACH
+def test_an_analog_spindle_is_stopped_for_a_change_and_at_the_end(post):
+    output = {"krl": "1", "rapid": "aoSpindle", "ls": "1", "ur": "0"}[post.name]
+    scale = 0.05 if post is FanucLs else 0.00005  # a listing's analog values are whole numbers
+    analog = GIVEN | {"spindle_speed": "aio", "spindle_speed_output": output, "spindle_speed_scale": scale}
+    events = (
+        Event(0, EventKind.SPINDLE, 9000.0),
+        Event(2, EventKind.TOOL, 2.0, "drill"),
+        Event(2, EventKind.SPINDLE, 5000.0),
+    )
+    program = straight_program(5, events=events)
+    text = b"".join(post(analog).write(program).values()).decode()
+    words = {"krl": r"\$ANOUT\[1\]=", "rapid": "SetAO aoSpindle,", "ls": r"AO\[1\]=", "ur": r"_out\(0, "}[post.name]
+    values = [float(value) for value in re.findall(words + r"([0-9.]+)", text)]
+    assert values == [9000 * scale, 0.0, 5000 * scale, 0.0]
+    assert 632 not in codes(post(analog), program)
+    assert (675 in codes(post(analog | {"spindle_speed_scale": 0.0005}), program)) is (post.name in ("krl", "ur"))
+
+
+@EACH
+def test_coolant_is_off_while_a_tool_is_changed_by_hand(post):
+    events = (Event(0, EventKind.COOLANT, 1.0), Event(2, EventKind.TOOL, 2.0, "drill"))
+    again = run(with_outputs(post), straight_program(5, events=events))
+    done = [kind for kind, _ in again.actions if kind in ("output", "stop")]
+    assert done == ["output", "output", "stop", "output", "output"]
+    switched = [value for kind, value in again.actions if kind == "output"]
+    assert switched[0] == switched[2] != switched[1] == switched[3]
+
+
+@EACH
+def test_feeds_that_would_be_rounded_to_nothing_are_refused(post):
+    assert 673 in codes(post(GIVEN), straight_program(4, feed=[0, 0.03, 600, 600])) or post is FanucLs
 
 
 # --- what is told, and what is refused ---

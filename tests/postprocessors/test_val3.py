@@ -22,6 +22,7 @@ from sicp_postprocessors.val3 import Val3, application_name
 from sicp_postprocessors.val3.xml import S7, Variable
 
 MOVES = ("movej", "movel")
+STOPPED = ["resetMotion()", "doSpindle=false", "doCoolant=false"]
 PLACED = {"tool": "0,0,150,0,0,0", "cell": "0,0,0,0,0,0"}
 TEST_VECTOR = np.array(
     [[0.813798, -0.469846, 0.342020], [0.543838, 0.823173, -0.163176], [-0.204874, 0.318796, 0.925417]]
@@ -257,9 +258,11 @@ class TestProgram:
 
     def test_stop_switches_off(self):
         linked = {"spindle_output": "B\\%Q0", "coolant_output": "B\\%Q1"}
-        assert load_val3(Val3(linked).write(simple_program())).code["stop"] == ["doSpindle=false", "doCoolant=false"]
-        assert load_val3(Val3().write(simple_program())).code["stop"] == []
-        assert load_val3(Val3().write(straight_program(2))).code["stop"] == []
+        assert load_val3(Val3(linked).write(simple_program())).code["stop"] == STOPPED
+        assert load_val3(Val3().write(simple_program())).code["stop"] == ["resetMotion()"]
+        assert load_val3(Val3().write(straight_program(2))).code["stop"] == ["resetMotion()"]
+        speed = {"spindle_speed": "aio", "spindle_speed_output": "B\\%A0", "spindle_speed_scale": 0.001}
+        assert load_val3(Val3(speed).write(simple_program())).code["stop"] == ["resetMotion()", "aioSet(aoSpindle,0)"]
 
 
 class TestSplit:
@@ -416,7 +419,7 @@ class TestSpindleAndTools:
         outputs = [value for kind, value in result.actions if kind == "output"]
         off = [("doSpindleCcw", "false"), ("doSpindle", "false")]
         assert outputs == [("doSpindle", "false"), ("doSpindleCcw", "true"), *off]
-        assert app.code["stop"] == ["doSpindle=false", "doSpindleCcw=false"]
+        assert app.code["stop"] == ["resetMotion()", "doSpindle=false", "doSpindleCcw=false"]
 
     def test_speed_by_analog_output(self):
         options = {"spindle_speed": "aio", "spindle_speed_output": "B\\%A0", "spindle_speed_scale": 0.001}
@@ -449,8 +452,8 @@ class TestSpindleAndTools:
         speed = {"spindle_speed": "aio", "spindle_speed_output": "B\\%A0", "spindle_speed_scale": 0.001}
         _, result = read_val3(Val3(speed | PLACED).write(straight_program(3, events=events)))
         assert ("analog", ("aoSpindle", "5")) in result.actions and "operator" not in dict(result.actions)
-        _, result = read_val3(Val3(PLACED | {"spindle_ccw_output": "B\\%Q1"}).write(straight_program(3, events=events)))
-        assert "operator" in dict(result.actions)
+        with pytest.raises(PathError, match=r"turns the spindle clockwise; .*--set post\.val3\.spindle_output="):
+            Val3(PLACED | {"spindle_ccw_output": "B\\%Q1"}).write(straight_program(3, events=events))
 
     def test_an_arm_whose_tool_or_cell_is_not_stated_waits_for_the_operator(self):
         for options, words in (

@@ -60,6 +60,13 @@ def actions(files):
     return result, [(k, {**v["mdesc"], **v["point"]} if k in MOVES else v) for k, v in told]
 
 
+def in_words_of_s7(value):
+    """Return a move with the blend word of s7."""
+    if not isinstance(value, dict) or "blend" not in value:
+        return value
+    return value | {"blend": value["blend"].replace("joint", "Cartesian")}
+
+
 class TestStyles:
     @EACH
     def test_three_readers_agree(self, dialect, style, tmp_path):
@@ -108,6 +115,8 @@ class TestStyles:
             actions(Val3(options(dialect, style, max_moves_per_program=70, max_points_per_array=50)).write(program))[1]
             for dialect, style in EACH.args[1]
         ]
+        # s6 knows the word joint for what s7 calls Cartesian.
+        told = [[(kind, in_words_of_s7(value)) for kind, value in each] for each in told]
         assert all(each == told[0] for each in told[1:])
         assert len([k for k, _ in told[0] if k in MOVES]) == 240
 

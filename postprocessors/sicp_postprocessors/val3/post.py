@@ -178,11 +178,16 @@ class Val3(Val3Words):
         ]
 
     def _stopping(self, program: Program) -> list[str]:
-        """Return the statements that the controller runs when the application is stopped: everything off, at once."""
+        """Return the statements that the controller runs when the application is stopped: everything off, at once.
+
+        Outputs of the user's stay: vacuum may hold the part.
+        """
         kinds = {event.kind for event in self.events(program)}
-        signals = self.spindle_signals() if EventKind.SPINDLE in kinds else ()
-        coolant = (self.coolant_signal(),) if EventKind.COOLANT in kinds else ()
-        return [line for signal in (*signals, *coolant) if signal for line in self.switch(signal, False)]
+        spindle = EventKind.SPINDLE in kinds
+        signals = [*(self.spindle_signals() if spindle else ())]
+        signals += [self.coolant_signal()] if EventKind.COOLANT in kinds else []
+        off = [line for signal in signals if signal for line in self.switch(signal, False)]
+        return ["resetMotion()", *off, *(self.spindle_speed(0.0) if spindle else ())]
 
     def _switched_links(self, program: Program) -> set[str]:
         return {switched[0] for event in program.path.events if (switched := self.switched(event))}

@@ -93,14 +93,14 @@ def speed_variables(
     """Return the speeds: mStart for the first point, mRapid, and mCut for pairs (m, 2) of feed, mm/s, and zone, mm."""
     speed = trimmed(rapid_mm_s, _SPEED_DECIMALS)
     rapid = _mdesc(options, tmax=speed, blend="off", zone="0")
-    variables = [Variable("mStart", "mdesc", [{**rapid, "vel": trimmed(options.approach_percent, 3)}])]
+    variables = [Variable("mStart", "mdesc", [{**rapid, "vel": trimmed(options.joint_percent, 3)}])]
     if rapids:
         variables.append(Variable("mRapid", "mdesc", [rapid]))
     if not len(cuts):
         return variables
     longest, (feeds, zones) = options.max_points_per_array, cuts.T
     template = dialect.speed_row(_mdesc(options, tmax=f"{{:.{_SPEED_DECIMALS}t}}", blend="{}", zone="{:.6t}"))
-    blends = words(["off", "Cartesian"])[(zones > 0).astype(np.int64)]
+    blends = words(["off", dialect.blend])[(zones > 0).astype(np.int64)]
     lines = rows(template, np.arange(len(cuts)) % longest, feeds, blends, zones, zones)
     return variables + _arrays("mCut", "mdesc", lines, longest)
 

@@ -50,7 +50,7 @@ class Val3Words(RobotPostprocessor):
     def operator(self, text: str) -> Iterator[str]:
         """Return the wait for an input, or for a variable that the operator sets."""
         if self.options.log_messages:
-            yield f'logMsg("{ascii_line(stop_words(text), drop=chr(34) + chr(92))[:60]}")'
+            yield f'logMsg("{ascii_line(stop_words(text).replace("]]>", "]] >"), drop=chr(34) + chr(92))[:60]}")'
         if self.options.continue_input:
             # A whole press: an input that is still on from the stop before does not count.
             yield "wait(diContinue==false)"

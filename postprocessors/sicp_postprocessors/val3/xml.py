@@ -45,6 +45,8 @@ class Dialect(ABC):
     """What the project says it was written for, unless the user says otherwise."""
     linked_in_code: ClassVar[bool]
     """True: outputs are linked by a statement; False: by the data."""
+    blend: ClassVar[str] = "Cartesian"
+    """Word of points that are run through."""
 
     @abstractmethod
     def project_file(self, version: str, programs: Iterable[str], data: str) -> bytes:

@@ -29,6 +29,7 @@ class S6(Dialect):
 
     version = "s6.8"
     linked_in_code = True
+    blend = "joint"  # the word that every version knows
 
     def project_file(self, version: str, programs: Iterable[str], data: str) -> bytes:
         """Return the .pjx; the inputs and outputs of the controller are the library io."""

@@ -13,56 +13,57 @@ MODULE porthole_test
     ! times its pose in the scan frame
     ! points: mm and quaternions, scalar first; tool Z points out of the
     ! flange into the work
-    ! first run: no blending, no move faster than 50 mm/s
+    ! first run: no blending, no straight move faster than 50 mm/s
     ConfL \Off;
     ConfJ \Off;
+    WaitRob \InPos;
+    ! stop: goes 50 mm off the origin, along the tool
+    TPWrite "stop: goes 50 mm off the origin, along t";
+    Stop;
     MoveJ [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vStart,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the tip is at 50 mm above the origin of the frame, along
-    ! its Z
-    TPWrite "stop: see that the tip is at 50 mm above";
+    ! stop: 50 mm off the origin, along the tool?
+    TPWrite "stop: 50 mm off the origin, along the to";
     Stop;
     MoveL [[50.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the tip has moved 50 mm along +X of the frame
-    TPWrite "stop: see that the tip has moved 50 mm a";
+    ! stop: moved 50 mm to +X?
+    TPWrite "stop: moved 50 mm to +X?";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the tip is back
-    TPWrite "stop: see that the tip is back";
+    ! stop: back?
+    TPWrite "stop: back?";
     Stop;
     MoveL [[0.0000,50.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the tip has moved 50 mm along +Y of the frame
-    TPWrite "stop: see that the tip has moved 50 mm a";
+    ! stop: moved 50 mm to +Y?
+    TPWrite "stop: moved 50 mm to +Y?";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the tip is back
-    TPWrite "stop: see that the tip is back";
+    ! stop: back?
+    TPWrite "stop: back?";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,0.9914449,0.0000000,-0.1305262],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the holder leans 15 degrees towards +X, the tip has not
-    ! moved
-    TPWrite "stop: see that the holder leans 15 degre";
+    ! stop: leans 15 deg to +X, tip stays?
+    TPWrite "stop: leans 15 deg to +X, tip stays?";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the holder is back
-    TPWrite "stop: see that the holder is back";
+    ! stop: back?
+    TPWrite "stop: back?";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.1305262,0.9914449,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the holder leans 15 degrees towards +Y, the tip has not
-    ! moved
-    TPWrite "stop: see that the holder leans 15 degre";
+    ! stop: leans 15 deg to +Y, tip stays?
+    TPWrite "stop: leans 15 deg to +Y, tip stays?";
     Stop;
     MoveL [[0.0000,0.0000,50.0000],[0.0000000,1.0000000,0.0000000,0.0000000],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],vCut0,fine,tTool\WObj:=wPart;
     WaitRob \InPos;
-    ! stop: see that the holder is back
-    TPWrite "stop: see that the holder is back";
+    ! stop: back?
+    TPWrite "stop: back?";
     Stop;
   ENDPROC
 ENDMODULE
