@@ -110,7 +110,7 @@ def test_moves_may_be_added_on_the_way_and_not_beside_it():
 
 def test_the_axis_of_an_added_move_must_lie_between_those_of_the_reference():
     made = divided(REFERENCE)
-    for angle, wrong in ((0.2, False), (1.0, True), (27.0, True)):
+    for angle, wrong in ((0.02, False), (1.0, True), (27.0, True)):
         axes = made.axes.copy()
         axes[10] = Rotation.from_rotvec(np.radians(angle) * np.array([0.0, 1.0, 0.0])).apply(axes[10])
         found = compared(replace(made, axes=axes), REFERENCE, "a.nc")

@@ -182,6 +182,7 @@ def test_what_is_positioned_or_turned_back_is_no_alarm(tmp_path):
     head = "G43.4 H1\nG0 X0."
     for old, new in (
         (head, "G0 A10. C170.\nG43.4 H1\nG0 X0."),  # the rotary axes are set before, and nothing else
+        (head, "G0 X5. Y5. A10. C170.\nG43.4 H1\nG0 X0."),  # as examples of Haas do before G234
         ("G49\nM30", "G49\nG0 A0. C360.\nG1 X5.\nM30"),
         ("G49\nM30", "G49\nG53 G0 A0. C0.\nG1 X5.\nM30"),
         ("G49\nM30", "G49\nG0 X5.\nM30"),
@@ -226,6 +227,7 @@ def test_missing_points_are_counted_where_they_matter(tmp_path):
     assert found.message.startswith("2 X words without a decimal point among those with one, the first X40:")
     assert findings_of(tmp_path, SIEMENS.replace("X0 Y0 Z0 A3", "X20 Y.5 Z0 A3").replace("Y3", "Y4")) == ()
     assert findings_of(tmp_path, HEIDENHAIN.replace("X+20", "X+20.5")) == ()
+    assert findings_of(tmp_path, text.replace("G17", "G17 G64 P0.01", 1)) == ()  # LinuxCNC
 
 
 def test_inches_and_incremental_moves_are_followed(tmp_path):

@@ -93,7 +93,8 @@ class CheckedAxis:
     ) -> None:
         """Check rotary words: the step from the block before, and cuts that turn while tip control is off.
 
-        `beside` tells that X, Y or Z stand beside them.
+        `beside` tells that they stand in a cut or beside Z; X and Y of a rapid move beside them place the tool only, as
+        the examples of Haas do before G234.
         """
         for letter, text in words.items():
             if text is None:
@@ -140,7 +141,7 @@ class CheckedAxis:
         if on and first and not self._was_on:
             self._defects.fail(TIP_CONTROL, "the tool axis turns before tip control is switched on", first)
         elif on and self._set_before and not self._was_on:
-            what = "rotary words beside X Y Z before tip control is switched on: those are no points of the tip"
+            what = "rotary words beside X Y Z before tip control is switched on: these are no points of the tip"
             self._defects.warn(TIP_CONTROL, what, self._set_before)
         if on:
             self._tilted_cut = 0

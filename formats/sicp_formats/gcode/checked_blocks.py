@@ -140,8 +140,7 @@ class CheckedBlocks:
                 siemens = i3 is not None or j3 is not None or k3 is not None
                 self._axis.point(siemens, (i3, j3) if siemens else (i, j), line)
         if turns:
-            beside = x is not None or y is not None or z is not None
-            self._turn({"A": a, "B": b, "C": c}, line, beside=beside)
+            self._turn({"A": a, "B": b, "C": c}, line, beside=z is not None)
         if self._mode:
             self._cut(f is not None, line)
 
@@ -182,13 +181,13 @@ class CheckedBlocks:
         elif "plane" not in self._stated:
             self._stated.add("plane")
             self._defects.warn(MODES, "an arc before its plane is stated (G17, G18 or G19)", line)
-        beside = any(letter in words for letter in "XYZ")
-        self._turn({letter: words.get(letter) for letter in "ABC"}, line, beside=beside)
+        self._turn({letter: words.get(letter) for letter in "ABC"}, line, beside="Z" in words)
         if self._mode:
             self._cut("F" in words, line)
 
     def _turn(self, angles: dict[str, str | None], line: int, *, beside: bool) -> None:
-        self._axis.turn(angles, absolute=self._absolute, cuts=bool(self._mode), beside=beside, line=line)
+        cuts = bool(self._mode)
+        self._axis.turn(angles, absolute=self._absolute, cuts=cuts, beside=beside or cuts, line=line)
 
     def _end(self, block: Block, line: int) -> bool:
         if not any(code in END_CODES for code in block.m):

@@ -13,8 +13,8 @@ POINTS = 874
 """Code of the findings, that of words."""
 
 _LETTERS = frozenset("XYZABCIJKR")
-_OTHER_WAY = ("G70", "G71", "G700", "G710")
-"""Units of controls to which a number is the same with and without a point."""
+_UNITS = (70.0, 71.0, 700.0, 710.0)
+"""How controls of Siemens and Heidenhain state units; to them a number is the same with and without a point."""
 
 
 class CheckedPoints:
@@ -38,8 +38,10 @@ class CheckedPoints:
                 self._without[letter] = (count + 1, first, at)
 
     def take_block(self, block: Block, line: int) -> None:
-        """Take any block; dwells have no coordinates, and keywords stand in programs of Siemens only."""
-        self._no_matter |= bool(block.keywords or block.manners) or any(f"G{code:g}" in _OTHER_WAY for code in block.g)
+        """Take any block; keywords stand in programs of Siemens only, G64 P in those of LinuxCNC."""
+        linuxcnc = any(code in (428.0, 429.0) for code in block.m) or (64.0 in block.g and "P" in block.words)
+        other = bool(block.keywords or block.manners) or any(code in _UNITS for code in block.g)
+        self._no_matter = self._no_matter or linuxcnc or other
         if 4.0 not in block.g:
             self.take(block.words.items(), line)
 
