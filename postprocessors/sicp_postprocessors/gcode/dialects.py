@@ -73,14 +73,11 @@ class Dialect:
     block_number, unnumbered, always_numbered, largest_number
         How blocks are numbered, first characters of lines that are not, whether all are, when they restart.
     shorter_way, stated_way
-        The words by which rotary axes go the shorter way, within a turn, and to the very angle that is stated; empty
-        where that is a setting of the machine.
+        The words by which rotary axes go the shorter way, and to the angle stated; empty where machines are set so.
     largest_inverse, inverse_decimals
         Largest F under G93, and its decimals; None where the control has no G93.
-    feed_point
-        F always has a point: some controls read one without it in thousandths.
-    largest_feed
-        Largest F per minute, None where no limit is known.
+    feed_point, largest_feed
+        F always has a point, as it may count thousandths without; its most per minute, None where none is known.
     dwells
         Words of the dwell time that may be chosen.
     """
@@ -198,7 +195,6 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             inch=None,
             modes=(),
             vector="NX{} NY{} NZ{} TX{} TY{} TZ{}",
-            block="{code} {tips} {turn}{feed}{end}",
             codes=("L", "L", " R0 FMAX"),
             vector_codes=("LN", "LN", " FMAX"),
             sign="+",

@@ -32,7 +32,7 @@ from sicp_postprocessors.gcode.options import GCodeOptions
 from sicp_postprocessors.gcode.positions import Positions, positions_of
 from sicp_postprocessors.gcode.proof import prove
 from sicp_postprocessors.gcode.setting import Setting
-from sicp_postprocessors.gcode.site_words import lacks_length, takes_loaded_length, tip_off_words, tip_on_words
+from sicp_postprocessors.gcode.site_words import length_remarks, tip_off_words, tip_on_words
 from sicp_postprocessors.gcode.subprograms import with_subprograms
 from sicp_postprocessors.numbers import fixed, trimmed
 from sicp_postprocessors.template import LinePostprocessor, Moves
@@ -173,10 +173,7 @@ class GCode(LinePostprocessor):
         if not options.knows_tip:
             yield self._set_up_words()
         if not options.tool and not named_at_start(program):
-            if lacks_length(options):
-                yield "no H word: the tool length that is active must be that of the tool"
-            elif takes_loaded_length(options):
-                yield "the length of the tool in the spindle is taken"
+            yield from length_remarks(options)
         yield f"coordinates in the {frame_name(program)} frame: the {offset} must hold it"
         if frame_name(program) == "part":
             yield f"its pose in the scan frame: {pose_words(program.T_scan_program)}"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from sicp_postprocessors.gcode.machine import Machine
 from sicp_postprocessors.gcode.options import GCodeOptions
 
-__all__ = ["lacks_length", "takes_loaded_length", "tip_off_words", "tip_on_words"]
+__all__ = ["lacks_length", "length_remarks", "tip_off_words", "tip_on_words"]
 
 _TOOL = "{tool}"
 
@@ -48,9 +50,12 @@ def lacks_length(options: GCodeOptions) -> bool:
     return length or any(_TOOL in line for line in _tip_lines(options))
 
 
-def takes_loaded_length(options: GCodeOptions) -> bool:
-    """Say whether the length of the tool in the spindle is taken where its number is not known."""
-    return _states_length(options) and bool(options.control.loaded_length)
+def length_remarks(options: GCodeOptions) -> Iterator[str]:
+    """Return what the head of a program says of the tool length where the number of the tool is not known."""
+    if lacks_length(options):
+        yield "no H word: the tool length that is active must be that of the tool"
+    elif _states_length(options):
+        yield "the length of the tool in the spindle is taken"
 
 
 def _tip_lines(options: GCodeOptions) -> tuple[str, ...]:
