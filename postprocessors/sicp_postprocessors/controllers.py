@@ -1,7 +1,8 @@
 """What robots have in common whose programs are plain text: signals, payload, speeds, poses in their own angles, parts.
 
 Codes: 670 payload not given, 671 tool or frame must be on the controller, 672 corners are rounded by speed and not by
-distance, 673 speed beyond what the language takes, 674 speed rounded, 675 analog value too large.
+distance, 673 speed beyond what the language takes, 674 speed rounded, 675 analog value too large, 676
+configuration not given.
 """
 
 from __future__ import annotations

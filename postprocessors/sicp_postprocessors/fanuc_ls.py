@@ -252,6 +252,13 @@ class FanucLs(ControllerPostprocessor):
         findings = stretch_findings(path, slow, 674, Level.WARN, message)
         message = "the speed is below 1 cm/min or 1 mm/sec, the least that the controller takes; raise the feed"
         findings += stretch_findings(path, fast, 674, Level.FAIL, message)
+        if options.configuration == type(options)().configuration:
+            words = flag(self.name, "configuration", "TEXT")
+            message = (
+                f"every point says CONFIG {options.configuration}, as nobody has said otherwise; if the arm stands in "
+                f"another one there, give it with {words}"
+            )
+            findings.append(Finding(676, Level.WARN, message))
         if options.rounding == "CNT" and (self.zones_mm(path) > 0.0).any():
             message = (
                 f"corners are rounded by CNT{options.cnt}, which depends on the speed: blend_mm and blend_corner_mm do "

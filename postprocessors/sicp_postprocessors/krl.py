@@ -43,6 +43,7 @@ _RESERVED = """
     ptp_spline public pulse real repeat resume return scirc sec signal slin spl spline spline_rel spls sptp
     sql_stmt state step string struc switch then to tool base trigger true until unit wait when while with
     world bas ir_stopm success part_base part_tool part_load con prn aux nul
+    abs acos asin atan2 cos forward inverse inv_pos round sin sqrt tan
 """
 
 

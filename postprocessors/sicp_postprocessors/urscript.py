@@ -41,6 +41,8 @@ _RESERVED = """
     and break continue def elif else end enter_critical exit_critical false for global halt if join kill local
     mod not or return run sec switch case default thread true while xor movej movel movep movec servoj servoc
     speedj speedl popup sleep sync textmsg set_tcp set_payload pose_trans part_frame p con prn aux nul
+    acos asin atan atan2 ceil cos d2r floor force get_forward_kin get_inverse_kin interpolate_pose length log norm pow
+    pose_add pose_dist pose_inv pose_sub r2d random sin sqrt stopj stopl str_len tan to_num to_str wait_for_home
 """
 
 

@@ -618,3 +618,13 @@ def test_a_listing_names_in_its_head_the_gates_that_were_overridden():
     again = run(FanucLs(), simple_program(overridden=("gate jump_mm; 0.75, limit 0.5", "gate halves")))
     head = " ".join(value for kind, value in again.actions[:20] if kind == "comment")
     assert head.index("gate jump_mm, 0.75, limit 0.5") < head.index("gate halves") < head.index("not a safety function")
+
+
+def test_a_configuration_that_nobody_gave_is_told():
+    assert 676 in codes(FanucLs(), straight_program(3))
+    assert 676 not in codes(FanucLs({"configuration": "F U T, 0, 0, 0"}), straight_program(3))
+
+
+@pytest.mark.parametrize(("post", "name"), [(UrScript, "sin"), (UrScript, "force"), (Krl, "sqrt")])
+def test_names_of_functions_are_not_taken(post, name):
+    assert post().program_name(dataclasses.replace(straight_program(3), name=name)) == f"P{name}"

@@ -546,3 +546,8 @@ def test_characters_that_xml_forbids_are_refused(text):
 def test_the_end_mark_of_code_is_refused():
     with pytest.raises(OutputError, match="program start holds ]]>"):
         S7().program_file("start", ["// ]]>"])
+
+
+def test_a_link_may_not_have_a_name_of_the_program_itself():
+    with pytest.raises(JobError, match="'doSpindle' is a name of the program's own"):
+        Val3({"dialect": "s6", "spindle_output": "doSpindle", "outputs": "M51=doSpindle:on"})

@@ -82,6 +82,8 @@ class Val3Options(RobotOptions):
             not _VERSION.fullmatch(self.version) or (self.version[:2] < "s7") != (self.dialect == "s6")
         ):
             problems.append("option 'version' must look like s7.10.2, or s6.8 for the dialect s6")
+        own = {"doSpindle", "doSpindleCcw", "doCoolant", "diContinue"} & set(self.links.values())
+        problems += [f"{name!r} is a name of the program's own; link another output" for name in sorted(own)]
         if self.dialect == "s7":
             return problems
         if self.payload is not None:
