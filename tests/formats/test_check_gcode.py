@@ -230,6 +230,16 @@ def test_missing_points_are_counted_where_they_matter(tmp_path):
     assert findings_of(tmp_path, text.replace("G17", "G17 G64 P0.01", 1)) == ()  # LinuxCNC
 
 
+@pytest.mark.parametrize(("call", "file"), [("o<part_1> call", "part_1.ngc"), ("N7 Part_1", "Part_1.spf")])
+def test_a_subprogram_beside_the_program_may_be_called(tmp_path, call, file):
+    text = INVERSE.replace("M30", f"{call}\nM30")
+    assert [f.level for f in findings_of(tmp_path, text)] == [Level.FAIL]
+    (tmp_path / file).write_text("M2\n", encoding="ascii")
+    (found,) = findings_of(tmp_path, text)
+    assert (found.code, found.level, found.where[-6:]) == (874, Level.INFO, "line 5")
+    assert found.message == f"{file} is a program of its own, not judged with this one"
+
+
 def test_inches_and_incremental_moves_are_followed(tmp_path):
     text = "G20 G91 G17\nG0 X0 Y0 Z0\nG1 X1 F10\nG2 X1 Y0 I.5 J0\nG2 X1 Y0 I.5001 J0\nG2 X1 Y0 I.501 J0\nM2\n"
     text = text.replace("G0 X0 Y0 Z0", "G90 G0 X0 Y0 Z0\nG91")

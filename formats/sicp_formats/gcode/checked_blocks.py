@@ -7,6 +7,7 @@ from collections import Counter
 
 from sicp_formats.gcode.checked_arcs import CheckedArcs
 from sicp_formats.gcode.checked_axis import CheckedAxis
+from sicp_formats.gcode.checked_calls import called_beside
 from sicp_formats.gcode.checked_length import CheckedLength
 from sicp_formats.gcode.checked_points import CheckedPoints
 from sicp_formats.gcode.codes import HOMING, MOTION, UNITS, heidenhain_text, refuse_codes
@@ -99,7 +100,11 @@ class CheckedBlocks:
         try:
             block = split_block(line.replace(":", "O", 1) if text[0] == ":" else line, self._decimal)
         except GCodeError as problem:
-            self._defects.fail(WORDS, str(problem), number)
+            if called := called_beside(text, self._defects.path):
+                self._defects.info(WORDS, f"{called} is a program of its own, not judged with this one", number)
+                self._axis.forget()
+            else:
+                self._defects.fail(WORDS, str(problem), number)
             self._arcs.forget()
             return False
         return self._block(block, number)
