@@ -113,7 +113,7 @@ def _cuts(tips_mm: FloatArray, rapid: BoolArray) -> _Cuts | None:
         return None
     # A cut goes on until a rapid move; moves of no length are left out, and break nothing.
     number = np.cumsum(~cutting, dtype=np.int64)
-    used = np.flatnonzero(cutting & (lengths > 0.0))
+    used = np.flatnonzero(cutting & (lengths > 1e-9))
     if len(used) < 2:
         return None
     s = np.concatenate([[0.0], np.cumsum(lengths[used])])
@@ -189,7 +189,7 @@ def _plane_crossings(a: FloatArray, b: FloatArray, normals: FloatArray) -> tuple
     between = b[:, None, :-1] - a[:, :-1, None]
     # Seen along n, the area of two vectors is n . (u x v).
     across = np.einsum("ki,kpqi->kpq", n, np.cross(d_a[:, :, None], d_b[:, None]))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t_a = np.einsum("ki,kpqi->kpq", n, np.cross(between, d_b[:, None])) / across
         t_b = np.einsum("ki,kpqi->kpq", n, np.cross(between, d_a[:, :, None])) / across
     lengths = np.linalg.norm(d_a, axis=2)[:, :, None] * np.linalg.norm(d_b, axis=2)[:, None]
