@@ -20,6 +20,7 @@ from sicp_cam.findings import Finding, Level
 from sicp_cam.limits import DEFAULT_LIMITS
 from sicp_cam.model import BoolArray, Event, EventKind, IntArray, Program, ToolPath
 from sicp_cam.rigid_motion import is_rigid
+from sicp_postprocessors.moves import events_in_order
 from sicp_postprocessors.text import counted
 
 __all__ = [
@@ -139,7 +140,7 @@ def _not_restarted(path: ToolPath, stops_spindle: Callable[[Event], bool]) -> li
     cuts = np.flatnonzero(~path.rapid)
     stopped: list[Event] = []
     runs, pending = False, None
-    for event in sorted(path.events, key=lambda event: event.before_move):
+    for event in events_in_order(path):
         if pending and _cut_between(cuts, pending.before_move, event.before_move):
             stopped.append(pending)
             pending = None

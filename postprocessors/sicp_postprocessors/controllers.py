@@ -11,7 +11,7 @@ import dataclasses
 import re
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -81,6 +81,11 @@ class ControllerOptions(RobotOptions):
             if signal and not self.signal.fullmatch(signal)
         ]
         return [*problems, *self._speed_problems(), *self._payload_problems()]
+
+    @property
+    def commands_speed(self) -> bool:
+        """Whether the program states the speed of the spindle."""
+        return self.spindle_speed != "none"
 
     def one_of(self, option: str, other: str) -> list[str]:
         """Return the problem of two options that say one thing, as a list that is empty if there is none."""
@@ -245,7 +250,7 @@ class ControllerPostprocessor(RobotPostprocessor):
             return []
         test = self_test_program(program, "self-test", options.self_test, options.self_test_step_mm)
         found = self._for_test().preflight(test)
-        return [replace(f, message=f"self-test: {f.message}") for f in found if f.level is Level.FAIL]
+        return [dataclasses.replace(f, message=f"self-test: {f.message}") for f in found if f.level is Level.FAIL]
 
     def _analog_findings(self, path: ToolPath) -> list[Finding]:
         options = self.options

@@ -10,7 +10,7 @@ import numpy as np
 
 from sicp_cam.model import BoolArray, Event, EventKind, FloatArray, IntArray, ToolPath
 
-__all__ = ["Moves", "divided_at_retracts", "events_by_move", "events_in_order", "longest_part", "tools_in_use"]
+__all__ = ["Moves", "divided_at_retracts", "events_by_move", "events_in_order", "tools_in_use"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,8 +110,3 @@ def divided_at_retracts(rapid: BoolArray, longest: int, *, within_cuts: bool) ->
         parts.append(range(start, stop))
         start = stop
     return [*parts, range(start, len(rapid))] if start < len(rapid) else parts
-
-
-def longest_part(parts: Iterable[range]) -> range:
-    """Return the part with most moves."""
-    return max(parts, key=len)

@@ -162,9 +162,8 @@ class RobotPostprocessor(LinePostprocessor):
         """Return the events as the program tells them, with what a person must do in its place.
 
         A tool change by hand needs spindle and coolant off before it, and a stop behind it; then the coolant goes on.
-        A spindle that no output starts is
-        started by the operator, for whom the program stops; what no output switches off is told in a comment. Nor does
-        the arm move before the operator has seen that tool or cell are not those of the robot.
+        A spindle that no output starts is started by the operator, for whom the program stops; what no output switches
+        off is told in a comment. Nor does the arm move before the operator has seen that tool or cell is not stated.
         """
         return [*self._not_stated(), *(self._told_by_hand(event) for event in self._with_tool_changes(program))]
 
@@ -189,7 +188,7 @@ class RobotPostprocessor(LinePostprocessor):
     def _tool_change(self, event: Event, running: Mapping[EventKind, float]) -> list[Event]:
         """Return a tool change between what must be off for it and what goes on behind it."""
         off = [kind for kind, value in running.items() if value]
-        by_hand = EventKind.SPINDLE in off and not any(self.spindle_signals()) and not self._commands_speed()
+        by_hand = EventKind.SPINDLE in off and not any(self.spindle_signals()) and not self.options.commands_speed
         text = f"{'spindle off, ' if by_hand else ''}tool {int(event.value)} {event.text}".strip()
         back = [(EventKind.COOLANT, 1.0, "")] if EventKind.COOLANT in off else []
         told = [
@@ -210,7 +209,7 @@ class RobotPostprocessor(LinePostprocessor):
         if event.kind is EventKind.COOLANT and not self.coolant_signal():
             text = f"coolant {'on' if event.value > 0 else 'off'}: no output is named for it"
             return Event(event.before_move, EventKind.COMMENT, 0.0, text, event.line)
-        if event.kind is not EventKind.SPINDLE or self._commands_speed():
+        if event.kind is not EventKind.SPINDLE or self.options.commands_speed:
             return event
         if (counter if event.value < 0.0 else clockwise) or (event.value == 0.0 and counter):
             return event
@@ -220,9 +219,6 @@ class RobotPostprocessor(LinePostprocessor):
         # Short, since pendants show 40 letters.
         text = f"start spindle {'ccw' if event.value < 0.0 else 'cw'}, {trimmed(abs(event.value), 3)} rev/min"
         return Event(event.before_move, EventKind.STOP, 0.0, text, event.line)
-
-    def _commands_speed(self) -> bool:
-        return getattr(self.options, "spindle_speed", "none") != "none"
 
     def switched(self, event: Event) -> tuple[str, bool] | None:
         """Return the output that a word of the path switches, by the option `outputs`."""

@@ -74,7 +74,7 @@ def _cell_findings(path: ToolPath, options: RobotOptions, post: str) -> list[Fin
             f"operator; give its pose there in mm and degrees with {flag(post, 'cell', _SIX)}"
         )
         findings.append(Finding(631, Level.WARN, message))
-    driven = options.spindle_output or getattr(options, "spindle_speed", "none") != "none"
+    driven = options.spindle_output or options.commands_speed
     signals = {
         EventKind.SPINDLE: (driven, "the program stops for the operator to start it"),
         EventKind.COOLANT: (options.coolant_output, "nothing switches it"),
@@ -100,7 +100,7 @@ def _spindle_findings(path: ToolPath, options: RobotOptions, post: str) -> list[
         words = flag(post, "spindle_output", "OUTPUT")
         message = f"the path turns the spindle clockwise; name the output that does with {words}"
         findings += [Finding(633, Level.FAIL, message, event_place(e)) for e in starts if e.value > 0]
-    if starts and getattr(options, "spindle_speed", "none") == "none":
+    if starts and not options.commands_speed:
         speeds = ", ".join(f"{abs(speed):g}" for speed in dict.fromkeys(event.value for event in starts))
         words = f", or {flag(post, 'spindle_speed', 'aio')}" if hasattr(options, "spindle_speed") else ""
         message = f"the spindle speed is not commanded: set {speeds} rev/min at the drive{words}"

@@ -82,6 +82,11 @@ class RobotOptions(ArmOptions):
         return self.blend and not self.first_run
 
     @property
+    def commands_speed(self) -> bool:
+        """Whether the program states the speed of the spindle; a controller that has words for it says so."""
+        return False
+
+    @property
     def joint_percent(self) -> float:
         """Joint speed of the move to the first point: a first run creeps, wherever the arm then stands."""
         return min(self.approach_percent, _FIRST_RUN_PERCENT) if self.first_run else self.approach_percent

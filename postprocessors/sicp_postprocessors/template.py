@@ -15,12 +15,7 @@ from sicp_cam.findings import Finding, Level
 from sicp_cam.model import BoolArray, Event, EventKind, FloatArray, Program, ToolPath
 from sicp_postprocessors.base import SAFETY_NOTE, failures, head_remarks
 from sicp_postprocessors.checks import event_findings, first_move_findings, move_place, name_findings, spindle_findings
-from sicp_postprocessors.moves import (
-    Moves,
-    events_by_move,
-    longest_part,
-    tools_in_use,
-)
+from sicp_postprocessors.moves import Moves, events_by_move, tools_in_use
 from sicp_postprocessors.options import flag
 from sicp_postprocessors.path_checks import PreflightOptions, path_findings
 from sicp_postprocessors.verbs import Verbs
@@ -248,7 +243,7 @@ class LinePostprocessor(Verbs):
         longest = getattr(self.options, "max_moves_per_program", None)
         if longest is None or not len(path):
             return []
-        part = longest_part(self.parts(path))
+        part = max(self.parts(path), key=len)
         if len(part) <= longest:
             return []
         message = (

@@ -530,7 +530,8 @@ def test_coolant_is_off_while_a_tool_is_changed_by_hand(post):
 
 @EACH
 def test_feeds_that_would_be_rounded_to_nothing_are_refused(post):
-    assert 673 in codes(post(GIVEN), straight_program(4, feed=[0, 0.03, 600, 600])) or post is FanucLs
+    assert 673 in codes(post(GIVEN), straight_program(4, feed=[0, 0.03, 600, 600]))
+    assert 673 not in codes(post(GIVEN), straight_program(4, feed=[0, 60.0, 600, 600]))
 
 
 # --- what is told, and what is refused ---

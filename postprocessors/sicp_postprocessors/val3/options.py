@@ -109,6 +109,11 @@ class Val3Options(RobotOptions):
         return {link: f"doUser{number}" for number, link in enumerate(links, 1)}
 
     @property
+    def commands_speed(self) -> bool:
+        """Whether the program states the speed of the spindle."""
+        return self.spindle_speed != "none"
+
+    @property
     def speed_scale(self) -> float:
         """Value for one rev/min: 1 where none is given."""
         return 1.0 if self.spindle_speed_scale is None else self.spindle_speed_scale
