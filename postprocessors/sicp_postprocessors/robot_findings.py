@@ -68,10 +68,9 @@ def _cell_findings(path: ToolPath, options: RobotOptions, post: str) -> list[Fin
         )
         findings.append(Finding(630, Level.WARN, message))
     if not options.cell_is_known:
-        world = "base plate" if getattr(options, "world_origin", "") == "base_plate" else "world"
         message = (
-            f"no cell is given, so the scan frame is taken as the robot's {world}, and the program waits for the "
-            f"operator; give its pose there in mm and degrees with {flag(post, 'cell', _SIX)}"
+            f"no cell is given, so the scan frame is taken as the robot's {options.cell_origin}, and the program waits "
+            f"for the operator; give its pose there in mm and degrees with {flag(post, 'cell', _SIX)}"
         )
         findings.append(Finding(631, Level.WARN, message))
     driven = options.spindle_output or options.commands_speed

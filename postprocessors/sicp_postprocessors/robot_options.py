@@ -82,6 +82,11 @@ class RobotOptions(ArmOptions):
         return self.blend and not self.first_run
 
     @property
+    def cell_origin(self) -> str:
+        """What `cell` is measured from, in words."""
+        return "world"
+
+    @property
     def commands_speed(self) -> bool:
         """Whether the program states the speed of the spindle; a controller that has words for it says so."""
         return False

@@ -240,7 +240,7 @@ class LinePostprocessor(Verbs):
         return () if switched is None else self.output(*switched)
 
     def _part_findings(self, path: ToolPath) -> list[Finding]:
-        longest = getattr(self.options, "max_moves_per_program", None)
+        longest = self.longest_program()
         if longest is None or not len(path):
             return []
         part = max(self.parts(path), key=len)

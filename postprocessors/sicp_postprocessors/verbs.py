@@ -145,9 +145,14 @@ class Verbs(Postprocessor):
         """Return the output that an event of kind OTHER switches, and how; None if it switches none."""
         return None
 
+    def longest_program(self) -> int | None:
+        """Return the most moves of a program, by the option `max_moves_per_program`; None where there is no limit."""
+        longest: int | None = getattr(self.options, "max_moves_per_program", None)
+        return longest
+
     def parts(self, path: ToolPath) -> list[range]:
         """Return the moves of each program, by the options `max_moves_per_program` and `split_cuts` if it has them."""
-        longest = getattr(self.options, "max_moves_per_program", None)
+        longest = self.longest_program()
         if longest is None:
             return [range(len(path))]
         return divided_at_retracts(path.rapid, longest, within_cuts=getattr(self.options, "split_cuts", False))

@@ -109,6 +109,11 @@ class Val3Options(RobotOptions):
         return {link: f"doUser{number}" for number, link in enumerate(links, 1)}
 
     @property
+    def cell_origin(self) -> str:
+        """What `cell` is measured from, in words."""
+        return "base plate" if self.world_origin == "base_plate" else "world"
+
+    @property
     def commands_speed(self) -> bool:
         """Whether the program states the speed of the spindle."""
         return self.spindle_speed != "none"
